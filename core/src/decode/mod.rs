@@ -1,0 +1,1 @@
+//! Wire-word decoders: the same code on the device and on the PC.

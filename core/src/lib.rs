@@ -1,0 +1,13 @@
+//! The measurement: from events to rotor speed with an error bar.
+#![no_std]
+#![forbid(unsafe_code)]
+
+pub mod decode;
+pub mod event;
+pub mod limits;
+pub mod reading;
+pub mod tachometer;
+
+pub use event::{Event, Geometry, GyroSample, Polarity};
+pub use reading::{Direction, Evidence, Frame, Reading, Reason, RotorReading, Speed, Status};
+pub use tachometer::{Memory, Poll, Roi, Settings, StoredEvent, Tachometer};

@@ -1,0 +1,2 @@
+//! The portable part of the handheld tachometer.
+#![no_std]

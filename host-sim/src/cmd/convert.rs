@@ -1,0 +1,12 @@
+//! `evtach convert`.
+
+use std::process::ExitCode;
+
+/// Arguments of `evtach convert`.
+#[derive(clap::Args)]
+pub struct Args {}
+
+/// Runs the subcommand.
+pub fn run(_args: Args) -> anyhow::Result<ExitCode> {
+    anyhow::bail!("not there yet")
+}

@@ -1,0 +1,8 @@
+//! One file per subcommand.
+
+pub mod bench;
+pub mod convert;
+pub mod info;
+pub mod measure;
+pub mod plot;
+pub mod synth;

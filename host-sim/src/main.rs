@@ -1,0 +1,46 @@
+//! `evtach`: rotor speed from event recordings.
+
+mod cmd;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+/// Rotor speed from event-camera recordings.
+#[derive(Parser)]
+#[command(name = "evtach", version, about)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(clap::Subcommand)]
+enum Command {
+    /// Speed of every rotor in a recording.
+    Measure(cmd::measure::Args),
+    /// Sensor, format, duration, rates: what a recording holds.
+    Info(cmd::info::Args),
+    /// Convert between recording formats.
+    Convert(cmd::convert::Args),
+    /// Make a recording with known truth.
+    Synth(cmd::synth::Args),
+    /// Measured tables: accuracy, cost, speed of decoding.
+    Bench(cmd::bench::Args),
+    /// A report with pictures.
+    Plot(cmd::plot::Args),
+}
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Measure(args) => cmd::measure::run(args),
+        Command::Info(args) => cmd::info::run(args),
+        Command::Convert(args) => cmd::convert::run(args),
+        Command::Synth(args) => cmd::synth::run(args),
+        Command::Bench(args) => cmd::bench::run(args),
+        Command::Plot(args) => cmd::plot::run(args),
+    };
+    result.unwrap_or_else(|error| {
+        eprintln!("evtach: {error:#}");
+        ExitCode::from(2)
+    })
+}

@@ -1,0 +1,1 @@
+//! Event recordings: one folder a format, found by looking inside.

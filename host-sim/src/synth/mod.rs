@@ -1,0 +1,1 @@
+//! Recordings with known truth, made from a scene.
