@@ -1,11 +1,16 @@
 //! The measurement: from events to rotor speed with an error bar.
-#![no_std]
+#![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
 
 pub mod decode;
 pub mod event;
 pub mod limits;
+pub mod math;
 pub mod reading;
+pub mod registration;
+pub mod rotors;
+pub mod speed;
+pub mod store;
 pub mod tachometer;
 
 pub use event::{Event, Geometry, GyroSample, Polarity};

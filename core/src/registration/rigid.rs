@@ -1,0 +1,151 @@
+//! Rigid transformations of the plane and the two ways of solving for them.
+
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+
+use crate::math::{Turn, atan2};
+
+/// Rotation about the rotor's centre, then a shift.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rigid {
+    rotation: Matrix2<f32>,
+    shift_px: Vector2<f32>,
+}
+
+impl Rigid {
+    /// The rotation by `yaw_rad`, positive = clockwise on the screen.
+    #[must_use]
+    pub fn yaw(yaw_rad: f32) -> Self {
+        let (sin, cos) = Turn::from_rad(yaw_rad).sin_cos();
+        Self { rotation: Matrix2::new(cos, -sin, sin, cos), shift_px: Vector2::zeros() }
+    }
+
+    /// Yaw angle in radians, -pi to pi: atan2(R10, R00).
+    #[must_use]
+    pub fn yaw_rad(&self) -> f32 {
+        atan2(self.rotation.m21, self.rotation.m11)
+    }
+
+    /// Where a point goes.
+    #[must_use]
+    pub fn apply(&self, x_px: f32, y_px: f32) -> (f32, f32) {
+        let moved = self.rotation * Vector2::new(x_px, y_px) + self.shift_px;
+        (moved.x, moved.y)
+    }
+
+    /// This transformation, then a further yaw and shift.
+    #[must_use]
+    pub fn then(&self, yaw_rad: f32, shift_px: (f32, f32)) -> Self {
+        let turn = Self::yaw(yaw_rad).rotation;
+        Self {
+            rotation: turn * self.rotation,
+            shift_px: turn * self.shift_px + Vector2::new(shift_px.0, shift_px.1),
+        }
+    }
+}
+
+/// Sums over matched points that give the best yaw (paper, "Initial Estimation": covariance and its
+/// singular value decomposition, R = V U^T), about the rotor's centre instead of the points' mean: a thin
+/// slice of a blade leaves rotation about its mean undetermined.
+#[derive(Clone, Copy, Debug)]
+pub struct PointToPoint {
+    covariance: Matrix2<f32>,
+}
+
+impl Default for PointToPoint {
+    fn default() -> Self {
+        Self { covariance: Matrix2::zeros() }
+    }
+}
+
+impl PointToPoint {
+    /// Adds a match.
+    pub fn add(&mut self, source: (f32, f32), target: (f32, f32)) {
+        let (p, q) = (Vector2::new(source.0, source.1), Vector2::new(target.0, target.1));
+        self.covariance += p * q.transpose();
+    }
+
+    /// The yaw in radians, atan2(R10, R00) of R = V U^T.
+    #[must_use]
+    pub fn solve(&self) -> Option<f32> {
+        let svd = self.covariance.svd(true, true);
+        let (u, v_t) = (svd.u?, svd.v_t?);
+        let v = v_t.transpose();
+        // A reflection would be no rotation: turn the weaker axis around.
+        let flip = Matrix2::new(1.0, 0.0, 0.0, (v * u.transpose()).determinant().signum());
+        let rotation = v * flip * u.transpose();
+        let yaw_rad = atan2(rotation.m21, rotation.m11);
+        yaw_rad.is_finite().then_some(yaw_rad)
+    }
+}
+
+/// Sums over matched points that give yaw and shift from the distance *along the motion* ("sliding", or
+/// point-to-helicoid residual): e = (q - p) . u - r w (t_q - t_p), with u the direction of motion at p.
+///
+/// The helicoid swept by a blade is its own tangent plane, so no normals are needed; fewer iterations and less
+/// stop bias than point-to-point.
+#[derive(Clone, Copy, Debug)]
+pub struct PointToHelicoid {
+    normal: Matrix3<f32>,
+    right: Vector3<f32>,
+}
+
+/// Weight of "no shift" in matches: keeps the solution finite where a slice shows one edge only.
+const SHIFT_PRIOR: f32 = 2.0;
+
+impl Default for PointToHelicoid {
+    fn default() -> Self {
+        Self {
+            normal: Matrix3::from_diagonal(&Vector3::new(1e-3, SHIFT_PRIOR, SHIFT_PRIOR)),
+            right: Vector3::zeros(),
+        }
+    }
+}
+
+impl PointToHelicoid {
+    /// Adds a match: source position, its direction of motion, radius, and the residual along it, in pixels.
+    pub fn add(&mut self, direction: (f32, f32), radius_px: f32, residual_px: f32) {
+        let a = Vector3::new(radius_px, direction.0, direction.1);
+        self.normal.ger(1.0, &a, &a, 1.0);
+        self.right += a * residual_px;
+    }
+
+    /// Further yaw in radians and shift in pixels.
+    #[must_use]
+    pub fn solve(&self) -> Option<(f32, (f32, f32))> {
+        let solved = self.normal.cholesky()?.solve(&self.right);
+        let finite = solved.iter().all(|value| value.is_finite());
+        finite.then_some((solved.x, (solved.y, solved.z)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_clockwise_on_the_screen_is_a_positive_yaw() {
+        // From 3 o'clock to half past four on a screen with y down: down and left.
+        let (x, y) = Rigid::yaw(0.785_398).apply(10.0, 0.0);
+        assert!(y > 7.0 && x > 7.0 && x < 7.2);
+        let mut sums = PointToPoint::default();
+        for (px, py) in [(10.0, 0.0), (0.0, 7.0), (-4.0, 3.0)] {
+            sums.add((px, py), Rigid::yaw(0.3).apply(px, py));
+        }
+        assert!((sums.solve().unwrap_or(0.0) - 0.3).abs() < 1e-5);
+    }
+
+    #[test]
+    fn the_yaw_survives_accumulation() {
+        let mut rigid = Rigid::yaw(0.0);
+        for _ in 0..20 {
+            rigid = rigid.then(0.1, (0.0, 0.0));
+        }
+        assert!((rigid.yaw_rad() - 2.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn nothing_matched_gives_no_wild_answer() {
+        assert!(PointToHelicoid::default().solve().is_some_and(|(yaw, _)| yaw == 0.0));
+        assert!(PointToPoint::default().solve().is_none_or(f32::is_finite));
+    }
+}

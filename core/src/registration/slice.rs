@@ -1,0 +1,65 @@
+//! Slices of events around a rotor's centre.
+
+use heapless::Vec;
+
+use crate::limits::SLICE_POINTS;
+use crate::speed::polar::Annulus;
+use crate::store::{StoredEvent, Window};
+
+/// One event of a slice.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SlicePoint {
+    /// Position relative to the rotor's centre in pixels.
+    pub x_px: f32,
+    /// Position relative to the rotor's centre in pixels.
+    pub y_px: f32,
+    /// Time since the start of the slice in seconds: the third coordinate of the registration.
+    ///
+    /// Relative to the slice, as slices that overlap would otherwise match themselves.
+    pub tau_s: f32,
+    /// Brighter or darker.
+    pub on: bool,
+}
+
+/// A slice of events.
+pub type Slice = Vec<SlicePoint, SLICE_POINTS>;
+
+/// Which events make a slice, in microseconds since the start of the window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cut {
+    /// Start of the slice.
+    pub start_us: f32,
+    /// Length of the slice.
+    pub length_us: f32,
+    /// Period with which the pattern repeats.
+    pub period_us: f32,
+    /// How many stretches, each one period after the other, are laid over each other: a thinned window holds too few
+    /// events in one.
+    pub folds: u32,
+}
+
+impl Cut {
+    /// Collects the slice, evenly thinned to the capacity.
+    pub fn collect(&self, window: &Window<'_>, annulus: &Annulus, slice: &mut Slice) {
+        slice.clear();
+        let stretch = |fold: u32| {
+            let start_us = self.start_us + fold as f32 * self.period_us;
+            (start_us, window.between(start_us as i32, (start_us + self.length_us) as i32))
+        };
+        let inside = |event: &StoredEvent| annulus.place(*event).is_some();
+        let total: usize = (0..self.folds).map(|fold| stretch(fold).1.filter(inside).count()).sum();
+        let (mut index, mut next) = (0, 0);
+        for fold in 0..self.folds {
+            let (start_us, events) = stretch(fold);
+            for event in events {
+                let Some((x_px, y_px, _)) = annulus.place(event) else { continue };
+                if index * SLICE_POINTS >= next {
+                    let tau_s = (event.since(window.start_us) as f32 - start_us) * 1e-6;
+                    slice.push(SlicePoint { x_px, y_px, tau_s, on: event.is_on() }).ok();
+                    next += total.max(SLICE_POINTS);
+                }
+                index += 1;
+            }
+        }
+    }
+}

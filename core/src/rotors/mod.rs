@@ -1,0 +1,13 @@
+//! Rotating objects extraction (paper, section "Rotating Objects Extraction").
+
+pub mod coherence;
+pub mod disc;
+pub mod extraction;
+pub mod heat;
+pub mod kmeans;
+pub mod winding;
+
+pub use coherence::Coherence;
+pub use disc::Disc;
+pub use extraction::{Extraction, Found};
+pub use heat::{CellGrid, HeatMap};

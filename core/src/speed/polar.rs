@@ -1,0 +1,104 @@
+//! Events of one rotor in polar coordinates about its centre.
+
+use heapless::Vec;
+
+use crate::limits::POLAR_EVENTS;
+use crate::math::{Turn, sqrt};
+use crate::rotors::Disc;
+use crate::store::{StoredEvent, Window};
+
+/// Inner edge of the annulus that is measured, as a share of the radius: nearer to the centre one pixel
+/// spans too large an angle.
+const INNER_SHARE: f32 = 0.2;
+/// Outer edge, as a share of the radius.
+const OUTER_SHARE: f32 = 1.15;
+
+/// The part of the image a rotor is measured in.
+#[derive(Clone, Copy, Debug)]
+pub struct Annulus {
+    x_px: f32,
+    y_px: f32,
+    inner2: f32,
+    outer2: f32,
+}
+
+impl Annulus {
+    /// The annulus of a disc.
+    #[must_use]
+    pub fn of(disc: Disc) -> Self {
+        let inner = (INNER_SHARE * disc.radius_px).max(2.0);
+        let outer = OUTER_SHARE * disc.radius_px;
+        Self { x_px: disc.x_px, y_px: disc.y_px, inner2: inner * inner, outer2: outer * outer }
+    }
+
+    /// Position relative to the centre, and its squared length, when the event lies in the annulus.
+    #[must_use]
+    pub fn place(&self, event: StoredEvent) -> Option<(f32, f32, f32)> {
+        let (dx, dy) = (f32::from(event.x()) - self.x_px, f32::from(event.y()) - self.y_px);
+        let r2 = dx * dx + dy * dy;
+        (r2 >= self.inner2 && r2 <= self.outer2).then_some((dx, dy, r2))
+    }
+}
+
+/// One event in polar coordinates, 8 bytes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PolarEvent {
+    /// Time since the middle of the window in microseconds.
+    pub t_us: i32,
+    /// Upper 16 bits of the direction: 0.1 mrad.
+    angle: u16,
+    /// Distance from the centre in 1/16 px, and the polarity in the top bit.
+    radius_polarity: u16,
+}
+
+impl PolarEvent {
+    /// Direction as seen from the centre.
+    #[must_use]
+    pub const fn angle(self) -> Turn {
+        Turn((self.angle as u32) << 16)
+    }
+
+    /// Distance from the centre in pixels.
+    #[must_use]
+    pub fn radius_px(self) -> f32 {
+        f32::from(self.radius_polarity & 0x7FFF) * 0.0625
+    }
+
+    /// Whether the pixel became brighter.
+    #[must_use]
+    pub const fn is_on(self) -> bool {
+        self.radius_polarity & 0x8000 != 0
+    }
+
+    /// Converts one event; `mid_us` is the middle of the window since its start.
+    fn new(event: StoredEvent, place: (f32, f32, f32), start_us: u64, mid_us: i32) -> Self {
+        let (dx, dy, r2) = place;
+        let angle = (Turn::of_vector(dy, dx).0 >> 16) as u16;
+        let radius = ((sqrt(r2) * 16.0) as u16).min(0x7FFF);
+        let polarity = if event.is_on() { 0x8000 } else { 0 };
+        Self { t_us: event.since(start_us) - mid_us, angle, radius_polarity: radius | polarity }
+    }
+}
+
+/// A rotor's events, evenly thinned to the capacity.
+pub type PolarTrack = Vec<PolarEvent, POLAR_EVENTS>;
+
+/// Fills `track` with the rotor's events of the window and returns how many there were before thinning.
+/// Cost: about 200 instructions for each event in the annulus.
+pub fn track(window: &Window<'_>, disc: Disc, track: &mut PolarTrack) -> usize {
+    track.clear();
+    let annulus = Annulus::of(disc);
+    let mid_us = (window.duration_us / 2) as i32;
+    let total = window.events().filter(|event| annulus.place(*event).is_some()).count();
+    // Fixed-point stride, so that any ratio thins evenly.
+    let stride = ((total as u64) << 16).div_ceil(POLAR_EVENTS as u64).max(1 << 16);
+    let mut next = 0_u64;
+    let placed = window.events().filter_map(|event| Some((event, annulus.place(event)?)));
+    for (index, (event, place)) in placed.enumerate() {
+        if (index as u64) << 16 >= next {
+            next += stride;
+            track.push(PolarEvent::new(event, place, window.start_us, mid_us)).ok();
+        }
+    }
+    total
+}
