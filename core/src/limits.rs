@@ -32,3 +32,12 @@ pub const SLICE_POINTS: usize = 512;
 
 /// Side of the nearest-neighbour grid in cells: 40 x 40 x 2 B = 3.1 KiB.
 pub const GRID_CELLS_SIDE: usize = 40;
+
+/// Largest blade count that is named; more are measured, but not counted.
+pub const MAX_BLADES: u8 = 8;
+
+/// Slice pairs at one baseline.
+pub const MAX_PAIRS: usize = 16;
+
+/// Rotors by every line before the choice: 24 x 28 B.
+pub const MAX_CANDIDATES: usize = 24;

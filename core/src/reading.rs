@@ -238,8 +238,16 @@ pub struct Evidence {
     pub scan_score: Option<f32>,
     /// Power at the opposite sense of rotation relative to the peak: 1 for flicker and vibration, near 0 for a rotor.
     pub scan_standing: Option<f32>,
+    /// Share of the rotor's events that keep step with it, 0 to 1.
+    pub coherence: Option<f32>,
+    /// Correlation at the angle of symmetry: below 1 where the parts differ.
+    pub symmetry_score: Option<f32>,
     /// Initial alignment (paper, "Initial Estimation"): speed in rad/s.
     pub initial_rad_s: Option<f32>,
+    /// Initial alignment with the axis left free: speed in rad/s.
+    pub free_axis_rad_s: Option<f32>,
+    /// Its standard error in rad/s, from the scatter over the window.
+    pub free_axis_sigma_rad_s: Option<f32>,
     /// Refinement (paper, "Estimation Refinement"): speed in rad/s.
     pub refined_rad_s: Option<f32>,
     /// Standard error of the refinement in rad/s.

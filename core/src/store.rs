@@ -2,9 +2,10 @@
 //!
 //! Time is cut into segments of equal length; [`WINDOW_SEGMENTS`] of them are the window, and
 //! [`SPARE_SEGMENTS`] more take in events while the window is measured. A segment first keeps a dense
-//! burst of consecutive events (what a registration of neighbouring slices needs), then a reservoir
-//! thinned evenly (what a long baseline needs): every 2^s-th event, s growing as the reservoir fills.
-//! What is kept depends on the events and the capacity alone, never on when a task ran.
+//! burst of consecutive events (what a registration of neighbouring slices needs), then, octave by octave, every
+//! second, fourth and eighth event, so that the baseline grows geometrically from the burst on; what is left of
+//! its memory is a reservoir thinned evenly (what a long baseline needs): every 2^s-th event, s growing as
+//! the reservoir fills. What is kept depends on the events and the capacity alone, never on when a task ran.
 
 use crate::event::{Event, Polarity};
 
@@ -23,6 +24,11 @@ pub struct StoredEvent {
     x: u16,
     y_polarity: u16,
 }
+
+/// Eighths of a segment that keep consecutive events.
+const DENSE_EIGHTHS: usize = 2;
+/// Eighths before the reservoir starts.
+const BURST_EIGHTHS: usize = 5;
 
 const POLARITY_BIT: u16 = 0x8000;
 
@@ -57,7 +63,7 @@ impl StoredEvent {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Segment {
     len: usize,
     counted: u64,
@@ -68,11 +74,19 @@ struct Segment {
     skip: u32,
 }
 
+impl Default for Segment {
+    fn default() -> Self {
+        // Where the octaves end, the reservoir goes on as densely as the last of them.
+        let stride_log2 = (BURST_EIGHTHS - DENSE_EIGHTHS) as u8;
+        Self { len: 0, counted: 0, lost: 0, stride_log2, skip: 0 }
+    }
+}
+
 /// Events of the recent past, in time order.
 #[derive(Debug)]
 pub struct Store<'m> {
     events: &'m mut [StoredEvent],
-    /// Events in one segment, of which the first half is the burst.
+    /// Events in one segment: 2/8 dense, 3/8 in octaves, 3/8 reservoir.
     capacity: usize,
     segments: [Segment; SEGMENTS],
     /// Ring position of the oldest segment.
@@ -146,7 +160,8 @@ impl<'m> Store<'m> {
             return;
         }
         let base = slot * self.capacity;
-        let burst = self.capacity / 2;
+        let octave = self.capacity / 8;
+        let burst = BURST_EIGHTHS * octave;
         if segment.len == self.capacity {
             // Halve the reservoir: every other event goes, those kept stay evenly spread.
             let reservoir = &mut self.events[base + burst..base + self.capacity];
@@ -161,9 +176,12 @@ impl<'m> Store<'m> {
             *place = StoredEvent::pack(event);
             segment.len += 1;
         }
-        if segment.len > burst {
-            segment.skip = (1_u32 << segment.stride_log2.min(31)) - 1;
-        }
+        let stride_log2 = match segment.len.checked_div(octave).unwrap_or(0) {
+            0..DENSE_EIGHTHS => 0,
+            eighth if eighth < BURST_EIGHTHS => (eighth - DENSE_EIGHTHS + 1) as u8,
+            _ => segment.stride_log2,
+        };
+        segment.skip = (1_u32 << stride_log2.min(31)) - 1;
     }
 
     /// Counts events lost before they reached the store.
@@ -205,7 +223,6 @@ impl<'m> Store<'m> {
             start_us: self.start_us,
             duration_us: self.segment_us * segments as u32,
             segments,
-            burst: self.capacity / 2,
         }
     }
 
@@ -243,8 +260,6 @@ pub struct Window<'a> {
     /// Length in microseconds.
     pub duration_us: u32,
     segments: usize,
-    /// Events in a burst.
-    burst: usize,
 }
 
 impl<'a> Window<'a> {
@@ -272,11 +287,10 @@ impl<'a> Window<'a> {
         self.segments
     }
 
-    /// The dense burst at the start of a segment.
+    /// The events of one segment: consecutive ones first, then ever sparser.
     #[must_use]
-    pub fn burst(&self, segment: usize) -> &'a [StoredEvent] {
-        let part = self.parts.get(segment).copied().unwrap_or(&[]);
-        &part[..part.len().min(self.burst)]
+    pub fn segment(&self, segment: usize) -> &'a [StoredEvent] {
+        self.parts.get(segment).copied().unwrap_or(&[])
     }
 
     /// Events with `from_us <= t < to_us`, both in microseconds since the window's start. O(log n).

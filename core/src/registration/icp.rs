@@ -20,8 +20,10 @@ const TRIM: f32 = 2.5;
 /// What is minimised.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Residual {
-    /// Positions only, yaw only: needs no idea of the speed (initial alignment, thin slices).
-    Position,
+    /// Positions only, turning about the centre: needs no idea of the speed (initial alignment, thin slices).
+    FixedAxis,
+    /// Positions only, yaw and shift free: needs no idea of the centre either.
+    FreeAxis,
     /// Distance along the motion at this speed in rad/s, with time as third coordinate (refinement and lock).
     Helicoid {
         /// Speed to a few percent, positive = clockwise.
@@ -82,7 +84,7 @@ fn one_way(
     residual: Residual,
 ) -> Option<Registered> {
     let lambda_px_per_s = match residual {
-        Residual::Position => 0.0,
+        Residual::FixedAxis | Residual::FreeAxis => 0.0,
         // Twice the mean speed of the points: flat optimum between one and four times.
         Residual::Helicoid { omega_rad_s } => 1.4 * radius_px * omega_rad_s.abs(),
     };
@@ -103,7 +105,7 @@ fn one_way(
             let to = &target[index];
             found += 1;
             match residual {
-                Residual::Position => {
+                Residual::FixedAxis | Residual::FreeAxis => {
                     squares += distance2;
                     if distance2 <= limit_px * limit_px {
                         point.add((x_px, y_px), (to.x_px, to.y_px));
@@ -129,7 +131,8 @@ fn one_way(
         limit_px = TRIM * sqrt(squares / found as f32);
         matched = matches as f32 / source.len() as f32;
         let (turn_rad, shift_px) = match residual {
-            Residual::Position => (point.solve()?, (0.0, 0.0)),
+            Residual::FixedAxis => (point.about_origin()?, (0.0, 0.0)),
+            Residual::FreeAxis => point.solve()?,
             Residual::Helicoid { .. } => helicoid.solve()?,
         };
         rigid = rigid.then(turn_rad, shift_px);

@@ -43,17 +43,20 @@ impl Rigid {
     }
 }
 
-/// Sums over matched points that give the best yaw (paper, "Initial Estimation": covariance and its
-/// singular value decomposition, R = V U^T), about the rotor's centre instead of the points' mean: a thin
-/// slice of a blade leaves rotation about its mean undetermined.
+/// Sums over matched points that give the best rotation and shift (paper, "Initial Estimation": covariance of
+/// the points about their means, its singular value decomposition, R = V U^T).
 #[derive(Clone, Copy, Debug)]
 pub struct PointToPoint {
-    covariance: Matrix2<f32>,
+    products: Matrix2<f32>,
+    source: Vector2<f32>,
+    target: Vector2<f32>,
+    count: f32,
 }
 
 impl Default for PointToPoint {
     fn default() -> Self {
-        Self { covariance: Matrix2::zeros() }
+        let (products, zero) = (Matrix2::zeros(), Vector2::zeros());
+        Self { products, source: zero, target: zero, count: 0.0 }
     }
 }
 
@@ -61,21 +64,41 @@ impl PointToPoint {
     /// Adds a match.
     pub fn add(&mut self, source: (f32, f32), target: (f32, f32)) {
         let (p, q) = (Vector2::new(source.0, source.1), Vector2::new(target.0, target.1));
-        self.covariance += p * q.transpose();
+        self.products += p * q.transpose();
+        self.source += p;
+        self.target += q;
+        self.count += 1.0;
     }
 
-    /// The yaw in radians, atan2(R10, R00) of R = V U^T.
+    /// Yaw in radians and shift in pixels.
     #[must_use]
-    pub fn solve(&self) -> Option<f32> {
-        let svd = self.covariance.svd(true, true);
-        let (u, v_t) = (svd.u?, svd.v_t?);
-        let v = v_t.transpose();
-        // A reflection would be no rotation: turn the weaker axis around.
-        let flip = Matrix2::new(1.0, 0.0, 0.0, (v * u.transpose()).determinant().signum());
-        let rotation = v * flip * u.transpose();
-        let yaw_rad = atan2(rotation.m21, rotation.m11);
-        yaw_rad.is_finite().then_some(yaw_rad)
+    pub fn solve(&self) -> Option<(f32, (f32, f32))> {
+        if self.count < 2.0 {
+            return None;
+        }
+        let (p, q) = (self.source / self.count, self.target / self.count);
+        let rotation = rotation(self.products - p * q.transpose() * self.count)?;
+        let shift_px = q - rotation * p;
+        Some((atan2(rotation.m21, rotation.m11), (shift_px.x, shift_px.y)))
     }
+
+    /// Yaw in radians about the origin, with no shift.
+    #[must_use]
+    pub fn about_origin(&self) -> Option<f32> {
+        let rotation = rotation(self.products)?;
+        Some(atan2(rotation.m21, rotation.m11))
+    }
+}
+
+/// R = V U^T of a covariance U S V^T.
+fn rotation(covariance: Matrix2<f32>) -> Option<Matrix2<f32>> {
+    let svd = covariance.svd(true, true);
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    let v = v_t.transpose();
+    // A reflection would be no rotation: turn the weaker axis around.
+    let flip = Matrix2::new(1.0, 0.0, 0.0, (v * u.transpose()).determinant().signum());
+    let rotation = v * flip * u.transpose();
+    rotation.iter().all(|value| value.is_finite()).then_some(rotation)
 }
 
 /// Sums over matched points that give yaw and shift from the distance *along the motion* ("sliding", or
@@ -129,9 +152,12 @@ mod tests {
         assert!(y > 7.0 && x > 7.0 && x < 7.2);
         let mut sums = PointToPoint::default();
         for (px, py) in [(10.0, 0.0), (0.0, 7.0), (-4.0, 3.0)] {
-            sums.add((px, py), Rigid::yaw(0.3).apply(px, py));
+            let (qx, qy) = Rigid::yaw(0.3).apply(px, py);
+            sums.add((px, py), (qx + 1.0, qy - 2.0));
         }
-        assert!((sums.solve().unwrap_or(0.0) - 0.3).abs() < 1e-5);
+        let (yaw_rad, shift_px) = sums.solve().unwrap_or_default();
+        assert!((yaw_rad - 0.3).abs() < 1e-5);
+        assert!((shift_px.0 - 1.0).abs() < 1e-4 && (shift_px.1 + 2.0).abs() < 1e-4);
     }
 
     #[test]
@@ -146,6 +172,6 @@ mod tests {
     #[test]
     fn nothing_matched_gives_no_wild_answer() {
         assert!(PointToHelicoid::default().solve().is_some_and(|(yaw, _)| yaw == 0.0));
-        assert!(PointToPoint::default().solve().is_none_or(f32::is_finite));
+        assert_eq!(PointToPoint::default().solve(), None);
     }
 }

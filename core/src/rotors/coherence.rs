@@ -94,10 +94,10 @@ impl Coherence {
         })
     }
 
-    /// Writes the number of events in step as heat, cell by cell, leaving out cells where `skip` holds.
-    pub fn heat(&self, grid: CellGrid, heat: &mut [u16], skip: impl Fn(f32, f32) -> bool) {
+    /// Writes the number of events in step as heat, cell by cell.
+    pub fn heat(&self, grid: CellGrid, heat: &mut [u16]) {
         heat.fill(0);
-        for phasor in self.phasors(grid).filter(|p| !skip(p.x_px, p.y_px)) {
+        for phasor in self.phasors(grid) {
             let index = grid.index(phasor.x_px as u16, phasor.y_px as u16);
             if let Some(cell) = heat.get_mut(index) {
                 *cell = cell.saturating_add((phasor.amplitude * HEAT_PER_EVENT) as u16);

@@ -35,10 +35,10 @@ impl Disc {
         dx * dx + dy * dy
     }
 
-    /// Whether the centre of one lies well inside the other: both cannot be rotors of their own.
+    /// Whether the two overlap so much that they cannot be rotors side by side.
     #[must_use]
-    pub fn same_place(&self, other: &Self) -> bool {
-        let reach = 0.6 * self.radius_px.max(other.radius_px);
+    pub fn overlaps(&self, other: &Self) -> bool {
+        let reach = 0.75 * (self.radius_px + other.radius_px);
         self.distance2(other) < reach * reach
     }
 }

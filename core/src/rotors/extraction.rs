@@ -17,7 +17,7 @@ use super::disc::{Candidate, Disc, candidate};
 use super::heat::CellGrid;
 use super::kmeans::{Cluster, KMeans, Seeding, davies_bouldin, nearest};
 use super::winding::{Winding, collect, explain};
-use crate::limits::{COHERENCE_CELLS, MAX_CLUSTERS, MAX_LINES, MAX_ROTORS};
+use crate::limits::{COHERENCE_CELLS, MAX_CANDIDATES, MAX_CLUSTERS, MAX_LINES, MAX_ROTORS};
 use crate::math::{TAU, sqrt};
 use crate::speed::polar::{PolarTrack, track};
 use crate::speed::scan::{Peak, Scanner};
@@ -53,6 +53,8 @@ pub struct Found {
     pub windings: u32,
     /// Share of the coherence map it explains.
     pub share: f32,
+    /// Events in step that it explains.
+    pub explained: f32,
 }
 
 /// Why nothing was found, when nothing was.
@@ -87,6 +89,8 @@ pub struct Extraction {
     best: Vec<Cluster, MAX_CLUSTERS>,
     /// What one rotation explains of the whole map.
     whole: Option<Found>,
+    /// Rotors by every line: the same one may stand here by several of its lines.
+    candidates: Vec<Found, MAX_CANDIDATES>,
     found: Vec<Found, MAX_ROTORS>,
     misses: Misses,
 }
@@ -129,10 +133,9 @@ pub struct View<'a> {
 }
 
 impl Extraction {
-    /// Starts over, keeping clear of rotors that are known already.
-    pub fn restart(&mut self, known: &[Found]) {
+    /// Starts over.
+    pub fn restart(&mut self) {
         *self = Self::default();
-        self.found.extend_from_slice(known).ok();
     }
 
     /// One bounded piece of work; `true` once [`Self::found`] stands.
@@ -213,7 +216,8 @@ impl Extraction {
 
     /// Fills the map of the next line and asks whether one rotation explains it all.
     fn map(&mut self, view: &View<'_>, scratch: &mut Scratch) {
-        let (Some(line), false) = (self.lines.get(self.line), self.found.is_full()) else {
+        let Some(line) = self.lines.get(self.line) else {
+            self.choose();
             self.stage = Stage::Done;
             return;
         };
@@ -221,8 +225,7 @@ impl Extraction {
         let grid = view.map_grid;
         scratch.coherence.fill(&view.window, grid, line_hz);
         let map = &mut scratch.map[..grid.len().min(COHERENCE_CELLS)];
-        let found = &self.found;
-        scratch.coherence.heat(grid, map, |x, y| covered(found, x, y));
+        scratch.coherence.heat(grid, map);
         let weights = &mut scratch.map_weights[..map.len()];
         weigh(map, MAP_FLOOR, weights);
         let mut one = KMeans::seed(grid, weights, 1, Seeding::FarthestMean);
@@ -230,22 +233,22 @@ impl Extraction {
         self.whole = None;
         self.best.clear();
         self.best_index = f32::MAX;
-        let phasors = || scratch.coherence.phasors(grid).filter(|p| !covered(found, p.x_px, p.y_px));
+        let phasors = || scratch.coherence.phasors(grid);
         if let Some(all) = candidate(grid, weights, one.clusters(), 0)
             && phasors().count() >= LEAST_PHASORS
         {
-            let region = collect(phasors(), |p| inside(p, &all));
+            let (region, total) = collect(phasors(), |p| inside(p, &all));
             let winding = explain(&region, all.disc);
             if winding.windings == 0 && winding.share > SHARE_OF_ONE && self.misses.in_step_hz.is_none() {
                 self.misses.in_step_hz = Some(line_hz);
             }
-            self.whole = believe(&winding, &region, &all, line_hz);
+            self.whole = believe(&winding, (&region, total), &all, line_hz);
         } else {
             self.line += 1;
             return;
         }
         if let Some(whole) = self.whole.filter(|whole| whole.share >= SHARE_OF_ONE) {
-            self.found.push(whole).ok();
+            self.enter(whole);
             self.line += 1;
         } else {
             self.k = 2;
@@ -277,14 +280,11 @@ impl Extraction {
             let Some(part) = candidate(grid, weights, &self.best, index) else { continue };
             let phasors = scratch.coherence.phasors(grid);
             let best = &self.best;
-            let found = &self.found;
-            let region = collect(phasors, |p| {
-                inside(p, &part)
-                    && nearest(best, p.x_px, p.y_px).0 == index
-                    && !covered(found, p.x_px, p.y_px)
+            let (region, total) = collect(phasors, |p| {
+                inside(p, &part) && nearest(best, p.x_px, p.y_px).0 == index
             });
             let winding = explain(&region, part.disc);
-            if let Some(one) = believe(&winding, &region, &part, line_hz) {
+            if let Some(one) = believe(&winding, (&region, total), &part, line_hz) {
                 turning.push(one).ok();
             }
         }
@@ -294,21 +294,33 @@ impl Extraction {
             turning.push(whole).ok();
         }
         for one in turning {
-            if !self.found.iter().any(|known| known.disc.same_place(&one.disc)) {
-                self.found.push(one).ok();
-            }
+            self.enter(one);
         }
         self.line += 1;
         self.stage = Stage::Map;
     }
-}
 
-/// Whether a point lies under a rotor that is known already.
-fn covered(found: &[Found], x_px: f32, y_px: f32) -> bool {
-    found.iter().any(|rotor| {
-        let (dx, dy) = (x_px - rotor.disc.x_px, y_px - rotor.disc.y_px);
-        dx * dx + dy * dy < rotor.disc.radius_px * rotor.disc.radius_px * 1.1
-    })
+    /// Enters a candidate; when the list is full, in place of the one that explains least.
+    fn enter(&mut self, candidate: Found) {
+        if let Err(candidate) = self.candidates.push(candidate)
+            && let Some(least) =
+                self.candidates.iter_mut().min_by(|a, b| a.explained.total_cmp(&b.explained))
+            && candidate.explained > least.explained
+        {
+            *least = candidate;
+        }
+    }
+
+    /// Chooses rotors that stand apart, those that explain most events first: a piece of a rotor, or a rotor by
+    /// the line of its neighbour, explains fewer than the rotor by its own.
+    fn choose(&mut self) {
+        self.candidates.sort_unstable_by(|a, b| b.explained.total_cmp(&a.explained));
+        for candidate in &self.candidates {
+            if !self.found.iter().any(|rotor| rotor.disc.overlaps(&candidate.disc)) {
+                self.found.push(*candidate).ok();
+            }
+        }
+    }
 }
 
 fn inside(phasor: &Phasor, part: &Candidate) -> bool {
@@ -318,7 +330,13 @@ fn inside(phasor: &Phasor, part: &Candidate) -> bool {
 }
 
 /// A rotor, when the winding is one to be believed.
-fn believe(winding: &Winding, region: &[Phasor], part: &Candidate, line_hz: f32) -> Option<Found> {
+fn believe(
+    winding: &Winding,
+    (region, total): (&[Phasor], usize),
+    part: &Candidate,
+    line_hz: f32,
+) -> Option<Found> {
+    let thinned = total as f32 / region.len().max(1) as f32;
     let axis = Disc { x_px: winding.x_px, y_px: winding.y_px, radius_px: 0.0 };
     let off_centre = MOST_OFF_CENTRE * part.disc.radius_px;
     let believed = winding.windings != 0
@@ -331,6 +349,7 @@ fn believe(winding: &Winding, region: &[Phasor], part: &Candidate, line_hz: f32)
         omega_rad_s: line_hz * TAU / winding.windings as f32,
         windings: winding.windings.unsigned_abs(),
         share: winding.share,
+        explained: winding.share * region.iter().map(|p| p.amplitude).sum::<f32>() * thinned,
     })
 }
 

@@ -44,8 +44,11 @@ pub struct Winding {
     pub share_in_step: f32,
 }
 
-/// Collects the phasors for which `inside` holds, evenly thinned to the capacity.
-pub fn collect(phasors: impl Iterator<Item = Phasor> + Clone, inside: impl Fn(&Phasor) -> bool) -> Region {
+/// Collects the phasors for which `inside` holds, evenly thinned to the capacity; returns their number before that too.
+pub fn collect(
+    phasors: impl Iterator<Item = Phasor> + Clone,
+    inside: impl Fn(&Phasor) -> bool,
+) -> (Region, usize) {
     let mut region = Region::new();
     let total = phasors.clone().filter(&inside).count();
     let mut next = 0;
@@ -55,7 +58,7 @@ pub fn collect(phasors: impl Iterator<Item = Phasor> + Clone, inside: impl Fn(&P
             next += total.max(WINDING_PHASORS);
         }
     }
-    region
+    (region, total)
 }
 
 /// The axis and winding number that explain the region best, searched within 0.6 radius of the disc's centre.
@@ -64,7 +67,7 @@ pub fn collect(phasors: impl Iterator<Item = Phasor> + Clone, inside: impl Fn(&P
 pub fn explain(region: &[Phasor], disc: Disc) -> Winding {
     let mut best = Winding::default();
     let mut spacing_px = COARSE_SPACING * disc.radius_px;
-    let mut search = |from: (f32, f32), steps: i32, spacing_px: f32, best: &mut Winding| {
+    let search = |from: (f32, f32), steps: i32, spacing_px: f32, best: &mut Winding| {
         for row in -steps..=steps {
             for column in -steps..=steps {
                 let (x_px, y_px) =

@@ -1,0 +1,163 @@
+//! Refinement and long-baseline lock: registration of slices a known number of angles of symmetry apart.
+//!
+//! With the coarse speed and the angle of symmetry, the baseline is extended (paper, "Estimation
+//! Refinement") to 0.8 of half an angle of symmetry; and, beyond the paper, to a whole number m of symmetry
+//! periods, where the yaw that is left is only m times the error of the speed so far. Pixels then see the same
+//! edge twice, so that what is fixed to the pixel (its latency, its place on the grid) cancels.
+
+use heapless::Vec;
+
+use super::initial::median;
+use super::polar::Annulus;
+use super::statistics::{mean_and_error, student_over_normal};
+use crate::limits::MAX_PAIRS;
+use crate::math::TAU;
+use crate::registration::{Cut, Icp, Residual};
+use crate::rotors::Disc;
+use crate::store::Window;
+
+/// Length of a slice in symmetry periods.
+const SLICE_PERIODS: f32 = 0.25;
+/// Events that a slice should hold; thinner ones are folded over several periods.
+const SLICE_EVENTS: f32 = 400.0;
+/// Most periods folded into a slice.
+const MOST_FOLDS: u32 = 32;
+
+/// What is known of a rotor when its slices are cut.
+#[derive(Clone, Copy, Debug)]
+pub struct Pace {
+    /// Axis and radius.
+    pub disc: Disc,
+    /// Speed so far in rad/s.
+    pub omega_rad_s: f32,
+    /// Equal parts of the rotor.
+    pub parts: u32,
+}
+
+impl Pace {
+    /// Symmetry period in microseconds.
+    #[must_use]
+    pub fn period_us(&self) -> f32 {
+        TAU * 1e6 / (self.omega_rad_s.abs() * self.parts as f32)
+    }
+
+    /// Angle of symmetry with the sign of the rotation, in radians.
+    fn signed_angle_rad(&self) -> f32 {
+        TAU / self.parts as f32 * if self.omega_rad_s < 0.0 { -1.0 } else { 1.0 }
+    }
+}
+
+/// A speed with its standard error.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// Speed in rad/s.
+    pub omega_rad_s: f32,
+    /// Standard error in rad/s: +/- 1.96 of it covers 95 %.
+    pub sigma_rad_s: f32,
+}
+
+/// Slice pairs at one baseline, spread over the window, registered one a step.
+#[derive(Debug)]
+pub struct Pairs {
+    pace: Pace,
+    /// Baseline in symmetry periods.
+    periods: f32,
+    pairs: u32,
+    next: u32,
+    folds: u32,
+    yaws: Vec<f32, MAX_PAIRS>,
+}
+
+impl Pairs {
+    /// Plans `pairs` slice pairs, `periods` symmetry periods apart. `events` is the number of the rotor's
+    /// events in the window.
+    #[must_use]
+    pub fn plan(pace: Pace, periods: f32, pairs: u32, events: usize, window_us: u32) -> Self {
+        let period_us = pace.period_us();
+        let in_slice = events as f32 * SLICE_PERIODS * period_us / window_us.max(1) as f32;
+        let room = (window_us as f32 / period_us - periods - SLICE_PERIODS).max(0.0);
+        let folds = (SLICE_EVENTS / in_slice.max(1.0)) as u32;
+        let folds = folds.clamp(1, MOST_FOLDS).min(1 + (0.5 * room) as u32);
+        Self { pace, periods, pairs: pairs.min(MAX_PAIRS as u32), next: 0, folds, yaws: Vec::new() }
+    }
+
+    /// Registers the next pair; `true` once all are done.
+    pub fn step(&mut self, window: &Window<'_>, icp: &mut Icp) -> bool {
+        if self.next >= self.pairs {
+            return true;
+        }
+        let period_us = self.pace.period_us();
+        let baseline_us = self.periods * period_us;
+        let span_us = (self.folds as f32 - 1.0 + SLICE_PERIODS) * period_us;
+        let room_us = (window.duration_us as f32 - baseline_us - span_us).max(0.0);
+        let start_us = room_us * self.next as f32 / (self.pairs.max(2) - 1) as f32;
+        let annulus = Annulus::of(self.pace.disc);
+        let mut cut = Cut {
+            start_us,
+            length_us: SLICE_PERIODS * period_us,
+            period_us,
+            folds: self.folds,
+        };
+        cut.collect(window, &annulus, &mut icp.first);
+        cut.start_us += baseline_us;
+        cut.collect(window, &annulus, &mut icp.second);
+        let angle_rad = self.pace.signed_angle_rad();
+        let whole = libm::roundf(self.periods);
+        let start_rad = (self.periods - whole) * angle_rad;
+        let residual = Residual::Helicoid { omega_rad_s: self.pace.omega_rad_s };
+        if let Some(found) = icp.both_ways(start_rad, self.pace.disc.radius_px, residual) {
+            self.yaws.push(found.yaw_rad - start_rad).ok();
+        }
+        self.next += 1;
+        self.next >= self.pairs
+    }
+
+    /// Starts the registrations from another speed, at the same baseline.
+    pub fn retarget(&mut self, omega_rad_s: f32) {
+        self.pace.omega_rad_s = omega_rad_s;
+    }
+
+    /// Baseline in symmetry periods.
+    #[must_use]
+    pub const fn periods(&self) -> f32 {
+        self.periods
+    }
+
+    /// Baseline in seconds.
+    fn baseline_s(&self) -> f32 {
+        self.periods * self.pace.period_us() * 1e-6
+    }
+
+    /// Speed from the mean of the yaws; its error from their scatter with Student's t, as the pairs are
+    /// independent while their slices do not overlap.
+    #[must_use]
+    pub fn mean(&self) -> Option<Estimate> {
+        let (mean, error) = mean_and_error(&self.yaws)?;
+        let factor = student_over_normal(self.yaws.len() - 1);
+        Some(Estimate {
+            omega_rad_s: self.pace.omega_rad_s + mean / self.baseline_s(),
+            sigma_rad_s: factor * error / self.baseline_s(),
+        })
+    }
+
+    /// Speed from the median of the yaws, which a slice pair gone astray does not move.
+    #[must_use]
+    pub fn median(&self) -> Option<Estimate> {
+        let mut yaws = self.yaws.clone();
+        let middle = median(&mut yaws)?;
+        let (_, error) = mean_and_error(&self.yaws)?;
+        // The median of normal errors scatters 1.25 times as much as the mean.
+        let factor = 1.25 * student_over_normal(self.yaws.len() - 1);
+        Some(Estimate {
+            omega_rad_s: self.pace.omega_rad_s + middle / self.baseline_s(),
+            sigma_rad_s: factor * error / self.baseline_s(),
+        })
+    }
+
+    /// Mean deviation from the predicted yaw, as a share of the angle of symmetry.
+    #[must_use]
+    pub fn deviation(&self) -> Option<f32> {
+        let mut yaws = self.yaws.clone();
+        Some(median(&mut yaws)?.abs() * self.pace.parts as f32 / TAU)
+    }
+}

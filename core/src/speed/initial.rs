@@ -1,0 +1,116 @@
+//! Initial alignment (paper, "Initial Estimation"): the speed of a rotor nothing is known about, by registration.
+//!
+//! The paper steps by a fixed 1 ms, which is right for one range of speeds. Here slices hold a fixed *number* of
+//! events, so that the time they take fits the rotor by itself, and the first slice of a segment is registered to the
+//! second, third, ...: as the store thins a segment octave by octave, the baseline grows
+//! geometrically, each step started from the rate before.
+//!
+//! The ladder climbs in one of two ways. With the axis *fixed* it needs little to see: a single mark on a disc
+//! will do. With the axis *free* it finds the rate of turning whatever the centre, so that a wrong centre,
+//! which misleads everything that counts angles about it, is found out wherever there is enough to see.
+
+use heapless::Vec;
+
+use super::polar::Annulus;
+use crate::registration::{Icp, Residual, SlicePoint};
+use crate::rotors::Disc;
+use crate::store::{WINDOW_SEGMENTS, Window};
+
+/// Events in a slice at best.
+const MOST_EVENTS: usize = 160;
+/// Events in a slice at least.
+const LEAST_EVENTS: usize = 24;
+/// Slices that a segment should hold.
+const SLICES: usize = 6;
+/// Most slices looked at.
+const MOST_SLICES: usize = 12;
+/// A level may change the rate by this factor at most, else the match jumped to another blade.
+const MOST_CHANGE: f32 = 0.5;
+/// Motion of the rim between the slices that is larger than the noise of a registration.
+const SEEN_PX: f32 = 3.0;
+/// Farthest turn between the slices, and farthest turn within the later slice, in radians.
+const MOST_TURN_RAD: f32 = 1.2;
+const MOST_BLUR_RAD: f32 = 0.5;
+
+/// Speed by each burst, in rad/s.
+pub type Rates = Vec<f32, WINDOW_SEGMENTS>;
+
+/// The rate that the ladder finds in one segment, in rad/s, positive = clockwise.
+#[must_use]
+pub fn ladder(
+    window: &Window<'_>,
+    segment: usize,
+    disc: Disc,
+    residual: Residual,
+    icp: &mut Icp,
+) -> Option<f32> {
+    let annulus = Annulus::of(disc);
+    let events = window.segment(segment);
+    let placed = || {
+        events.iter().filter_map(|event| {
+            let (x_px, y_px, _) = annulus.place(*event)?;
+            let t_us = event.since(window.start_us);
+            Some((t_us, SlicePoint { x_px, y_px, tau_s: 0.0, on: event.is_on() }))
+        })
+    };
+    let size = (placed().count() / SLICES).min(MOST_EVENTS);
+    if size < LEAST_EVENTS {
+        return None;
+    }
+    let mut rest = placed();
+    icp.first.clear();
+    let mut first_us = 0.0_f32;
+    for (t_us, point) in rest.by_ref().take(size) {
+        icp.first.push(point).ok();
+        first_us += t_us as f32 / size as f32;
+    }
+    let mut rate: Option<f32> = None;
+    // Whether the rate rests on a motion large enough to judge the next by.
+    let mut seen = false;
+    for _ in 0..MOST_SLICES {
+        icp.second.clear();
+        let (mut second_us, mut from_us, mut to_us) = (0.0_f32, None, 0);
+        for (t_us, point) in rest.by_ref().take(size) {
+            icp.second.push(point).ok();
+            second_us += t_us as f32 / size as f32;
+            from_us = from_us.or(Some(t_us));
+            to_us = t_us;
+        }
+        let baseline_s = (second_us - first_us) * 1e-6;
+        let length_s = (to_us - from_us.unwrap_or(to_us)) as f32 * 1e-6;
+        let rate_so_far = rate.unwrap_or(0.0).abs();
+        if icp.second.len() < size
+            || baseline_s <= 0.0
+            || rate_so_far * baseline_s > MOST_TURN_RAD
+            || rate_so_far * length_s > MOST_BLUR_RAD
+        {
+            break;
+        }
+        let start_rad = rate.map_or(0.0, |rate| rate * baseline_s);
+        let Some(registered) = icp.both_ways(start_rad, disc.radius_px, residual) else {
+            break;
+        };
+        let next = registered.yaw_rad / baseline_s;
+        if let Some(before) = rate
+            && seen
+            && (next - before).abs() > MOST_CHANGE * before.abs().max(next.abs())
+        {
+            break;
+        }
+        seen = registered.yaw_rad.abs() * disc.radius_px > SEEN_PX;
+        rate = Some(next);
+    }
+    rate
+}
+
+/// The median of values, which it sorts.
+#[must_use]
+pub fn median(values: &mut [f32]) -> Option<f32> {
+    values.sort_unstable_by(f32::total_cmp);
+    let middle = values.len() / 2;
+    if values.len() % 2 == 1 {
+        values.get(middle).copied()
+    } else {
+        Some(0.5 * (values.get(middle.checked_sub(1)?)? + values.get(middle)?))
+    }
+}

@@ -1,0 +1,500 @@
+//! The measurement of one rotor in one window, step by step: the paper's stages and the lock beyond them.
+
+use super::baseline::{Estimate, Pace, Pairs};
+use super::initial::{Rates, ladder, median};
+use super::phase::{Pattern, newton, slope};
+use super::polar::{PolarTrack, track};
+use super::scan::{Scan, Scanner};
+use super::statistics::mean_and_error;
+use super::symmetry::symmetry;
+use crate::math::{TAU, sqrt};
+use crate::reading::{Evidence, Frame, Reason, Speed, Status};
+use crate::registration::{Icp, Residual};
+use crate::rotors::{Disc, Found};
+use crate::store::{WINDOW_SEGMENTS, Window};
+
+/// Steps of centre and speed by the polar phase.
+const NEWTON_STEPS: u8 = 6;
+/// A rotor keeps at least this share of its events in step.
+const LEAST_COHERENCE: f32 = 0.3;
+/// Power of the scan over chance, per window.
+const LEAST_SCORE: f32 = 40.0;
+/// Power at the opposite frequency over power at the line: a standing pattern beyond this.
+const MOST_STANDING: f32 = 0.7;
+/// Two coarse speeds that differ by more than this contradict each other.
+const COARSE_AGREEMENT: f32 = 0.15;
+/// The rate about a free axis contradicts when it is off by this share and this many of its standard errors.
+const FREE_AXIS_AGREEMENT: f32 = 0.25;
+const FREE_AXIS_SIGMAS: f32 = 4.0;
+/// Scan and phase look at the same lines: they must agree closely.
+const SCAN_AGREEMENT: f32 = 0.04;
+/// Fewest events of a rotor that are measured.
+const LEAST_EVENTS: usize = 300;
+/// Symmetry periods and revolutions that a lock needs in the window.
+const LOCK_PERIODS: f32 = 3.0;
+const LOCK_REVOLUTIONS: f32 = 2.0;
+/// Share of a symmetry period below which not even a coarse reading stands.
+const COARSE_PERIODS: f32 = 0.8;
+/// Symmetry below which parts differ so much that baselines are whole revolutions.
+const ALIKE_SCORE: f32 = 0.85;
+/// Slice pairs: refinement, lock, fractional-baseline test.
+const REFINEMENT_PAIRS: u32 = 12;
+const LOCK_PAIRS: u32 = 8;
+const FRACTIONAL_PAIRS: u32 = 3;
+/// Step of the refinement in symmetry periods (paper: eta x half an angle of symmetry, eta = 0.8).
+const REFINEMENT_PERIODS: f32 = 0.4;
+/// Baseline of the lock as a share of the window.
+const LOCK_SHARE: f32 = 2.0 / 3.0;
+/// A step to m periods is safe while three standard errors stay below this share of a period.
+const SAFE_SLIP: f32 = 0.33;
+/// Farthest deviation of the fractional-baseline test, as a share of the angle of symmetry.
+const MOST_DEVIATION: f32 = 0.03;
+/// Witnesses of the lock may differ by this much, or by eight standard errors.
+const LOCK_AGREEMENT: f32 = 2e-3;
+const LOCK_SIGMAS: f32 = 8.0;
+/// A lock with a larger relative error is only coarse.
+const MOST_LOCK_SIGMA: f32 = 3e-3;
+/// Error of a coarse reading, relative, for one symmetry period in the window.
+const COARSE_SIGMA: f32 = 0.01;
+/// Fastest shaft, and fastest passing of blades, in revolutions a minute.
+const MOST_RPM: f32 = 60_000.0;
+const MOST_BLADE_RPM: f32 = 150_000.0;
+/// Roll of a hand-held camera for each pixel of shift: tremor turns the camera by about one milliradian as
+/// it shifts the image by one pixel.
+const ROLL_RAD_PER_PX: f32 = 1e-3;
+/// Slower wandering of the centre than this in px/s is the measurement's own noise.
+const STILL_PX_S: f32 = 6.0;
+
+/// What the person stated.
+#[derive(Clone, Copy, Debug)]
+pub struct Stated {
+    /// Blade count, when given.
+    pub blades: Option<u8>,
+    /// One standard deviation of the clock's error in ppm.
+    pub clock_sigma_ppm: f32,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Stage {
+    #[default]
+    Newton,
+    Scan,
+    Symmetry,
+    Initial,
+    Refinement,
+    Further,
+    Lock,
+    Fractional,
+    Phase,
+    Done,
+}
+
+/// Memory that a measurement works in.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    /// Slices and grid.
+    pub icp: Icp,
+    /// Spectrum.
+    pub scanner: Scanner,
+}
+
+/// The measurement of one rotor.
+#[derive(Debug)]
+pub struct Measurement {
+    stage: Stage,
+    /// Repetitions of the stage.
+    turn: u8,
+    /// Whether the scan has already sent the measurement back once.
+    second_look: bool,
+    disc: Disc,
+    omega_rad_s: f32,
+    harmonic: u32,
+    events: usize,
+    parts: Option<u8>,
+    alike: bool,
+    rates: Rates,
+    free_rates: Rates,
+    pairs: Option<Pairs>,
+    estimate: Estimate,
+    status: Status,
+    alpha_rad_s2: Option<f32>,
+    drift_px_s: f32,
+    /// Window in microseconds that would do for a lock.
+    wanted_us: f32,
+    evidence: Evidence,
+}
+
+impl Measurement {
+    /// Starts the measurement of a rotor that extraction found.
+    #[must_use]
+    pub fn new(found: &Found) -> Self {
+        Self {
+            stage: Stage::Newton,
+            turn: 0,
+            second_look: false,
+            disc: found.disc,
+            omega_rad_s: found.omega_rad_s,
+            harmonic: found.windings,
+            events: 0,
+            parts: None,
+            alike: true,
+            rates: Rates::new(),
+            free_rates: Rates::new(),
+            pairs: None,
+            estimate: Estimate::default(),
+            status: Status::Refused(Reason::Searching),
+            alpha_rad_s2: None,
+            drift_px_s: 0.0,
+            wanted_us: 0.0,
+            evidence: Evidence::default(),
+        }
+    }
+
+    /// One bounded piece of work; `true` once the result stands.
+    pub fn step(
+        &mut self,
+        window: &Window<'_>,
+        stated: &Stated,
+        polar: &mut PolarTrack,
+        scratch: &mut Scratch,
+    ) -> bool {
+        match self.stage {
+            Stage::Newton => self.newton(window, polar, scratch),
+            Stage::Scan => self.scan(window, polar, scratch),
+            Stage::Symmetry => self.symmetry(stated, polar),
+            Stage::Initial => self.initial(window, scratch),
+            Stage::Refinement => self.refinement(window, scratch),
+            Stage::Further => self.further(window, scratch),
+            Stage::Lock => self.lock(window, scratch),
+            Stage::Fractional => self.fractional(window, scratch),
+            Stage::Phase => self.phase(window, stated, polar),
+            Stage::Done => {}
+        }
+        self.stage == Stage::Done
+    }
+
+    /// Name of the stage that the next step belongs to.
+    #[must_use]
+    pub const fn stage(&self) -> &'static str {
+        match self.stage {
+            Stage::Newton => "centre",
+            Stage::Scan => "scan",
+            Stage::Symmetry => "symmetry",
+            Stage::Initial => "initial",
+            Stage::Refinement => "refinement",
+            Stage::Further => "further refinement",
+            Stage::Lock => "lock",
+            Stage::Fractional => "fractional test",
+            Stage::Phase => "phase",
+            Stage::Done => "done",
+        }
+    }
+
+    fn refuse(&mut self, reason: Reason) {
+        self.status = Status::Refused(reason);
+        self.stage = Stage::Done;
+    }
+
+    /// Centre and speed by the polar phase, a Newton step at a time.
+    fn newton(&mut self, window: &Window<'_>, polar: &mut PolarTrack, scratch: &mut Scratch) {
+        self.events = track(window, self.disc, polar);
+        self.evidence.events = self.events as u32;
+        if self.events < LEAST_EVENTS {
+            return self.refuse(Reason::TooFewEvents);
+        }
+        if self.turn < NEWTON_STEPS {
+            self.turn += 1;
+            let found =
+                newton(polar, self.disc, self.omega_rad_s, self.harmonic, window.duration_us);
+            let Some(step) = found else { return self.refuse(Reason::NoRotation) };
+            let reach_px = 0.3 * self.disc.radius_px;
+            self.disc.x_px += step.dx_px.clamp(-reach_px, reach_px);
+            self.disc.y_px += step.dy_px.clamp(-reach_px, reach_px);
+            self.omega_rad_s += step.domega_rad_s;
+            return;
+        }
+        let coherence =
+            Pattern::learn(polar, self.disc, self.omega_rad_s, self.harmonic).coherence();
+        self.evidence.coherence = Some(coherence);
+        if coherence < LEAST_COHERENCE {
+            return self.refuse(Reason::NoRotation);
+        }
+        scratch.scanner.restart();
+        self.stage = Stage::Scan;
+    }
+
+    /// Scan over harmonic and frequency about the refined centre: first coarse witness.
+    fn scan(&mut self, window: &Window<'_>, polar: &PolarTrack, scratch: &mut Scratch) {
+        if !scratch.scanner.step(polar, window.duration_us) {
+            return;
+        }
+        let Some(scan) = scratch.scanner.finish(polar, window.duration_us) else {
+            return self.refuse(Reason::NoRotation);
+        };
+        let Scan { omega_rad_s, score, standing, .. } = scan;
+        self.evidence.scan_rad_s = Some(omega_rad_s);
+        self.evidence.scan_score = Some(score);
+        self.evidence.scan_standing = Some(standing);
+        if score < LEAST_SCORE || standing > MOST_STANDING {
+            return self.refuse(Reason::NoRotation);
+        }
+        let revolutions = omega_rad_s.abs() * window.duration_us as f32 * 1e-6 / TAU;
+        // The scan's lines are a tenth of a line wide at best.
+        let tolerance = SCAN_AGREEMENT.max(0.3 / (revolutions * scan.harmonic as f32));
+        if (omega_rad_s - self.omega_rad_s).abs() > tolerance * omega_rad_s.abs() {
+            if self.second_look {
+                return self.refuse(Reason::Ambiguous);
+            }
+            self.second_look = true;
+            self.omega_rad_s = omega_rad_s;
+            self.harmonic = scan.harmonic;
+            self.turn = 0;
+            self.stage = Stage::Newton;
+            return;
+        }
+        self.turn = 0;
+        self.stage = Stage::Symmetry;
+    }
+
+    /// Angle of symmetry.
+    fn symmetry(&mut self, stated: &Stated, polar: &PolarTrack) {
+        let symmetry = symmetry(polar, self.disc, self.omega_rad_s);
+        self.parts = stated.blades.or(symmetry.parts);
+        self.alike = stated.blades.is_none() && symmetry.score >= ALIKE_SCORE;
+        self.evidence.symmetry_score = Some(symmetry.score);
+        let rpm = self.omega_rad_s.abs() * Speed::RPM_PER_RAD_S;
+        let blades = f32::from(self.parts.unwrap_or(1));
+        if rpm > MOST_RPM || rpm * blades > MOST_BLADE_RPM {
+            return self.refuse(Reason::TooFast);
+        }
+        self.turn = 0;
+        self.stage = Stage::Initial;
+    }
+
+    /// Initial alignment in every other segment: second coarse witness.
+    fn initial(&mut self, window: &Window<'_>, scratch: &mut Scratch) {
+        let segment = 2 * usize::from(self.turn);
+        if segment < window.segments().min(WINDOW_SEGMENTS) {
+            let mut climb =
+                |residual| ladder(window, segment, self.disc, residual, &mut scratch.icp);
+            if let Some(rate) = climb(Residual::FixedAxis) {
+                self.rates.push(rate).ok();
+            }
+            if let Some(rate) = climb(Residual::FreeAxis) {
+                self.free_rates.push(rate).ok();
+            }
+            self.turn += 1;
+            return;
+        }
+        let Some(initial) = median(&mut self.rates) else {
+            return self.refuse(Reason::TooFewEvents);
+        };
+        self.evidence.initial_rad_s = Some(initial);
+        if (initial - self.omega_rad_s).abs() > COARSE_AGREEMENT * self.omega_rad_s.abs() {
+            return self.refuse(Reason::Ambiguous);
+        }
+        if let (Some(free), Some((_, error))) =
+            (median(&mut self.free_rates), mean_and_error(&self.free_rates))
+        {
+            self.evidence.free_axis_rad_s = Some(free);
+            self.evidence.free_axis_sigma_rad_s = Some(error);
+            let apart = (free - self.omega_rad_s).abs();
+            if apart > FREE_AXIS_SIGMAS * error && apart > FREE_AXIS_AGREEMENT * self.omega_rad_s.abs() {
+                return self.refuse(Reason::Ambiguous);
+            }
+        }
+        let window_s = window.duration_us as f32 * 1e-6;
+        let revolutions = self.omega_rad_s.abs() * window_s / TAU;
+        let periods = revolutions * f32::from(self.parts.unwrap_or(1));
+        self.evidence.periods = Some(periods);
+        let short = (LOCK_PERIODS / periods).max(LOCK_REVOLUTIONS / revolutions);
+        self.wanted_us = short * window.duration_us as f32;
+        if periods < COARSE_PERIODS {
+            return self.refuse(Reason::TooSlow);
+        }
+        // Until something better: as good as the share of a period that the window shows.
+        let spread = COARSE_SIGMA * self.omega_rad_s.abs() / periods;
+        self.estimate = Estimate { omega_rad_s: self.omega_rad_s, sigma_rad_s: spread };
+        self.status = Status::Coarse;
+        if periods < 1.0 + REFINEMENT_PERIODS {
+            self.stage = Stage::Phase;
+            return;
+        }
+        self.plan(window, REFINEMENT_PERIODS, REFINEMENT_PAIRS);
+        self.stage = Stage::Refinement;
+    }
+
+    fn pace(&self) -> Pace {
+        Pace {
+            disc: self.disc,
+            omega_rad_s: self.omega_rad_s,
+            parts: u32::from(self.parts.unwrap_or(1)).max(1),
+        }
+    }
+
+    fn plan(&mut self, window: &Window<'_>, periods: f32, pairs: u32) {
+        let plan = Pairs::plan(self.pace(), periods, pairs, self.events, window.duration_us);
+        self.pairs = Some(plan);
+    }
+
+    /// Advances the planned pairs; the finished set once all are registered.
+    fn advance(&mut self, window: &Window<'_>, scratch: &mut Scratch) -> Option<Pairs> {
+        let pairs = self.pairs.as_mut()?;
+        if pairs.step(window, &mut scratch.icp) { self.pairs.take() } else { None }
+    }
+
+    /// The paper's refinement: step extended to 0.8 of half an angle of symmetry.
+    fn refinement(&mut self, window: &Window<'_>, scratch: &mut Scratch) {
+        let Some(pairs) = self.advance(window, scratch) else { return };
+        let Some(refined) = pairs.median() else {
+            self.stage = Stage::Phase;
+            return;
+        };
+        self.evidence.refined_rad_s = Some(refined.omega_rad_s);
+        self.evidence.refined_sigma_rad_s = Some(refined.sigma_rad_s);
+        if (refined.omega_rad_s - self.omega_rad_s).abs()
+            > COARSE_AGREEMENT * self.omega_rad_s.abs()
+        {
+            return self.refuse(Reason::Ambiguous);
+        }
+        self.plan(window, REFINEMENT_PERIODS, REFINEMENT_PAIRS);
+        if let Some(pairs) = &mut self.pairs {
+            pairs.retarget(refined.omega_rad_s);
+        }
+        self.stage = Stage::Further;
+    }
+
+    /// The paper's further refinement, kept to show what it gains.
+    fn further(&mut self, window: &Window<'_>, scratch: &mut Scratch) {
+        let Some(pairs) = self.advance(window, scratch) else { return };
+        self.evidence.further_rad_s = pairs.median().map(|found| found.omega_rad_s);
+        self.plan_lock(window, self.omega_rad_s.abs() * 0.01);
+        self.stage = Stage::Lock;
+    }
+
+    /// Plans the lock at the longest baseline that cannot slip a period while the speed is known to `sigma_rad_s`.
+    fn plan_lock(&mut self, window: &Window<'_>, sigma_rad_s: f32) {
+        let pace = self.pace();
+        let periods = window.duration_us as f32 / pace.period_us();
+        let safe = SAFE_SLIP * pace.omega_rad_s.abs() / (3.0 * sigma_rad_s);
+        let mut m = libm::floorf((LOCK_SHARE * periods).min(safe)).max(1.0);
+        // Where the parts differ, only a whole revolution brings back the same picture.
+        let parts = pace.parts as f32;
+        if !self.alike && m >= parts {
+            m = libm::floorf(m / parts) * parts;
+        }
+        self.plan(window, m, LOCK_PAIRS);
+    }
+
+    /// Long-baseline lock.
+    fn lock(&mut self, window: &Window<'_>, scratch: &mut Scratch) {
+        let Some(pairs) = self.advance(window, scratch) else { return };
+        let longest = pairs.periods();
+        if let Some(found) = pairs.mean() {
+            self.evidence.lock_rad_s = Some(found.omega_rad_s);
+            self.evidence.lock_sigma_rad_s = Some(found.sigma_rad_s);
+            self.omega_rad_s = found.omega_rad_s;
+            let sigma = found.sigma_rad_s.max(found.omega_rad_s.abs() * 1e-5);
+            self.plan_lock(window, sigma);
+            if self.pairs.as_ref().is_some_and(|next| next.periods() > 1.5 * longest) {
+                return;
+            }
+        }
+        self.plan(window, (longest - 0.35).max(0.65), FRACTIONAL_PAIRS);
+        self.stage = Stage::Fractional;
+    }
+
+    /// Fractional-baseline test: an alias fits at whole periods and nowhere between.
+    fn fractional(&mut self, window: &Window<'_>, scratch: &mut Scratch) {
+        let Some(pairs) = self.advance(window, scratch) else { return };
+        self.evidence.fractional_deviation = pairs.deviation();
+        self.stage = Stage::Phase;
+    }
+
+    /// Polar phase: second witness of the lock; then the verdict.
+    fn phase(&mut self, window: &Window<'_>, stated: &Stated, polar: &mut PolarTrack) {
+        track(window, self.disc, polar);
+        let found =
+            slope(polar, self.disc, self.omega_rad_s, self.harmonic, window.duration_us);
+        if let Some(found) = found {
+            self.evidence.phase_rad_s = Some(found.speed.omega_rad_s);
+            self.evidence.phase_sigma_rad_s = Some(found.speed.sigma_rad_s);
+            self.drift_px_s = found.drift_px_s;
+            if found.alpha_rad_s2.abs() > 4.0 * found.alpha_sigma_rad_s2 {
+                self.alpha_rad_s2 = Some(found.alpha_rad_s2);
+            }
+        }
+        self.verdict(window, stated);
+        self.stage = Stage::Done;
+    }
+
+    /// Combines the witnesses of the lock, or says why the reading stays coarse.
+    fn verdict(&mut self, window: &Window<'_>, stated: &Stated) {
+        let witness = |omega: Option<f32>, sigma: Option<f32>| {
+            Some(Estimate { omega_rad_s: omega?, sigma_rad_s: sigma? })
+        };
+        let lock = witness(self.evidence.lock_rad_s, self.evidence.lock_sigma_rad_s);
+        let phase = witness(self.evidence.phase_rad_s, self.evidence.phase_sigma_rad_s);
+        let window_s = window.duration_us as f32 * 1e-6;
+        if let (Some(lock), Some(phase)) = (lock, phase) {
+            let apart = (lock.omega_rad_s - phase.omega_rad_s).abs();
+            let sigma = sqrt(
+                lock.sigma_rad_s * lock.sigma_rad_s + phase.sigma_rad_s * phase.sigma_rad_s,
+            );
+            let agree = apart < (LOCK_AGREEMENT * lock.omega_rad_s.abs()).max(LOCK_SIGMAS * sigma);
+            let whole = self.evidence.fractional_deviation.is_some_and(|d| d < MOST_DEVIATION);
+            let both = combine(lock, phase);
+            let sharp = both.sigma_rad_s < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
+            let long = self.wanted_us <= 1.02 * window.duration_us as f32;
+            if agree && whole && sharp && long {
+                self.estimate = both;
+                self.status = Status::Locked;
+            } else if !agree && !whole {
+                self.status = Status::Refused(Reason::Ambiguous);
+            }
+        }
+        let clock = stated.clock_sigma_ppm * 1e-6 * self.estimate.omega_rad_s;
+        let roll = if self.drift_px_s > STILL_PX_S {
+            ROLL_RAD_PER_PX * self.drift_px_s * roll_share(window_s)
+        } else {
+            0.0
+        };
+        let own = self.estimate.sigma_rad_s;
+        self.estimate.sigma_rad_s = sqrt(own * own + clock * clock + roll * roll);
+    }
+
+    /// Status, disc, blade count, speed and evidence, once [`Self::step`] has returned `true`.
+    #[must_use]
+    pub fn result(&self) -> (Status, Disc, Option<u8>, Option<Speed>, Evidence) {
+        let speed = self.status.reason().is_none().then_some(Speed {
+            omega_rad_s: self.estimate.omega_rad_s,
+            omega_sigma_rad_s: self.estimate.sigma_rad_s,
+            alpha_rad_s2: self.alpha_rad_s2,
+            frame: Frame::Camera,
+        });
+        (self.status, self.disc, self.parts, speed, self.evidence)
+    }
+
+    /// Window in microseconds that a lock needs, 0 when the speed is not known.
+    #[must_use]
+    pub const fn wanted_us(&self) -> f32 {
+        self.wanted_us
+    }
+}
+
+/// Mean weighted by the inverse variances. The witnesses look at the same events, so the error is not taken to
+/// shrink by having two.
+fn combine(a: Estimate, b: Estimate) -> Estimate {
+    let (va, vb) = (a.sigma_rad_s * a.sigma_rad_s, b.sigma_rad_s * b.sigma_rad_s);
+    let (wa, wb) = (vb / (va + vb), va / (va + vb));
+    Estimate {
+        omega_rad_s: a.omega_rad_s * wa + b.omega_rad_s * wb,
+        sigma_rad_s: sqrt(wa * va + wb * vb),
+    }
+}
+
+/// Share of the tremor's roll rate that is left in the mean over a window: tremor swings back and forth at a
+/// few hertz, so a longer window averages more of it.
+fn roll_share(window_s: f32) -> f32 {
+    (0.1 / window_s).min(1.0)
+}

@@ -1,0 +1,100 @@
+//! Angle of rotational symmetry: how many equal parts a rotor has.
+//!
+//! The paper clusters 300 events with K-means++ and the Davies-Bouldin index, which never returns one part and errs
+//! often (0 to 100 % right). Here: angular autocorrelation of the rotor in its own frame. With the speed known
+//! all events of the window can be turned back to one instant; the power of the angular harmonics of what is seen
+//! then is the Fourier transform of the autocorrelation, chance taken off.
+
+use heapless::Vec;
+
+use super::polar::PolarEvent;
+use crate::limits::MAX_BLADES;
+use crate::math::{Turn, TurnRate};
+use crate::rotors::Disc;
+
+/// Angular harmonics: the third overtone of eight blades.
+const HARMONICS: usize = 24;
+/// Rings and polarities whose patterns are turned against each other and so are summed by power.
+const RINGS: usize = 4;
+const BANKS: usize = 2 * RINGS;
+/// Least score of a symmetry, else the rotor has one part.
+const LEAST_SCORE: f32 = 0.08;
+/// The largest count within this share of the best score wins: six blades also repeat like three and two.
+const CLOSE_TO_BEST: f32 = 0.85;
+/// Largest count that is tried: beyond [`MAX_BLADES`] only to say that it is beyond.
+const MOST_PARTS: usize = 20;
+
+/// What the autocorrelation says.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Symmetry {
+    /// Number of equal parts, `None` when it is above [`MAX_BLADES`].
+    pub parts: Option<u8>,
+    /// Correlation at the angle of symmetry over that at zero: below 1 where parts differ.
+    pub score: f32,
+}
+
+/// Finds the number of equal parts. Cost: about 24 x 15 instructions an event, and 100 000.
+#[must_use]
+pub fn symmetry(track: &[PolarEvent], disc: Disc, omega_rad_s: f32) -> Symmetry {
+    let powers = harmonic_powers(track, disc, omega_rad_s);
+    let at = |turns: f32| -> f32 {
+        let angle = (turns * 65_536.0) as u32;
+        powers
+            .iter()
+            .enumerate()
+            .map(|(index, power)| {
+                power * Turn(angle.wrapping_mul(index as u32 + 1) << 16).sin_cos().1
+            })
+            .sum()
+    };
+    let zero = at(0.0);
+    if zero <= 0.0 {
+        return Symmetry { parts: Some(1), score: 0.0 };
+    }
+    // Mean correlation at the multiples of the angle of symmetry, less that half-way between them.
+    let comb = |parts: usize| {
+        let angle = 1.0 / parts as f32;
+        let peaks: f32 = (1..parts).map(|i| at(i as f32 * angle)).sum();
+        let valleys: f32 = (0..parts).map(|i| at((i as f32 + 0.5) * angle)).sum();
+        (peaks / (parts - 1) as f32 - valleys / parts as f32) / zero
+    };
+    let mut scores = Vec::<f32, { MOST_PARTS + 1 }>::new();
+    for parts in 0..=MOST_PARTS {
+        scores.push(if parts < 2 { 0.0 } else { comb(parts) }).ok();
+    }
+    let best = scores.iter().copied().fold(0.0, f32::max);
+    if best < LEAST_SCORE {
+        return Symmetry { parts: Some(1), score: best };
+    }
+    let parts = (2..=MOST_PARTS).rev().find(|n| scores[*n] >= CLOSE_TO_BEST * best).unwrap_or(1);
+    let mean_peak =
+        (1..parts).map(|i| at(i as f32 / parts as f32)).sum::<f32>() / (parts - 1).max(1) as f32;
+    let known = parts <= usize::from(MAX_BLADES);
+    Symmetry { parts: known.then_some(parts as u8), score: mean_peak / zero }
+}
+
+/// Power of each angular harmonic in the rotor's own frame, less what unrelated events would give.
+fn harmonic_powers(track: &[PolarEvent], disc: Disc, omega_rad_s: f32) -> [f32; HARMONICS] {
+    let rate = TurnRate::from_rad_s(omega_rad_s);
+    let mut sums = [[(0.0_f32, 0.0_f32); HARMONICS]; BANKS];
+    let mut counts = [0.0_f32; BANKS];
+    for event in track {
+        let ring = (event.radius_px() / disc.radius_px.max(1.0) * RINGS as f32) as usize;
+        let bank = 2 * ring.min(RINGS - 1) + usize::from(event.is_on());
+        counts[bank] += 1.0;
+        let (sin, cos) = event.angle().minus(rate.after(event.t_us)).sin_cos();
+        let (mut s, mut c) = (sin, cos);
+        for sum in &mut sums[bank] {
+            sum.0 += c;
+            sum.1 += s;
+            (c, s) = (c * cos - s * sin, s * cos + c * sin);
+        }
+    }
+    let mut powers = [0.0; HARMONICS];
+    for (bank, count) in sums.iter().zip(counts) {
+        for (power, (re, im)) in powers.iter_mut().zip(bank) {
+            *power += (re * re + im * im - count).max(0.0);
+        }
+    }
+    powers
+}
