@@ -10,6 +10,7 @@ pub mod edges;
 mod field;
 pub mod motion;
 mod pixel;
+pub mod presets;
 mod random;
 mod readout;
 pub mod scene;

@@ -335,3 +335,19 @@ fn the_scene_survives_json_and_rejects_nonsense() {
     bad.rotors[0] = Rotor { ramp_per_s: -20.0, ..Rotor::default() };
     assert!(generate(&bad).is_err());
 }
+
+#[test]
+fn every_preset_can_be_made() {
+    use clap::ValueEnum as _;
+    for preset in presets::Preset::value_variants() {
+        let mut scene = preset.scene();
+        scene.duration_ms = scene.duration_ms.min(30.0);
+        let made = generate(&scene).unwrap();
+        let refuse = scene.rotors.is_empty();
+        assert_eq!(made.truth.verdict == Verdict::Refuse, refuse, "{preset:?}");
+        assert!(made.events.len() > 1000, "{preset:?}: {} events", made.events.len());
+        for r in &made.truth.rotors {
+            assert!(r.events > 200, "{preset:?}: a rotor with {} events", r.events);
+        }
+    }
+}
