@@ -23,7 +23,7 @@ enum Command {
     /// Convert between recording formats.
     Convert(cmd::convert::Args),
     /// Make a recording with known truth.
-    Synth(cmd::synth::Args),
+    Synth(Box<cmd::synth::Args>),
     /// Measured tables: accuracy, cost, speed of decoding.
     Bench(cmd::bench::Args),
     /// A report with pictures.
@@ -35,7 +35,7 @@ fn main() -> ExitCode {
         Command::Measure(args) => cmd::measure::run(args),
         Command::Info(args) => cmd::info::run(args),
         Command::Convert(args) => cmd::convert::run(args),
-        Command::Synth(args) => cmd::synth::run(args),
+        Command::Synth(args) => cmd::synth::run(&args),
         Command::Bench(args) => cmd::bench::run(args),
         Command::Plot(args) => cmd::plot::run(args),
     };

@@ -1,0 +1,190 @@
+//! The outline of a rotor in polar coordinates: one description for both event models.
+
+use std::f64::consts::{PI, TAU};
+
+use super::scene::{Rotor, Shape};
+
+/// Width of the blurred transition in units of the blur's standard deviation: that of a smoothstep.
+const TRANSITION_PER_SIGMA: f64 = 4.472;
+
+/// A rotor's outline.
+#[derive(Clone, Debug)]
+pub struct Blades {
+    shape: Shape,
+    blades: f64,
+    pitch: f64,
+    odd_width: f64,
+    radius: f64,
+    hub: f64,
+    transition: f64,
+}
+
+/// What holds at one radius, whatever the angle.
+#[derive(Clone, Copy, Debug)]
+pub struct Ring {
+    /// Radius in pixels.
+    pub r: f64,
+    /// Half the angle a blade covers, in radians; `None`: no blade at this radius.
+    half: Option<f64>,
+    /// Angle by which the blade's middle line lags at this radius, in radians.
+    bend: f64,
+    /// Pixels across the edge per radian of rotation.
+    lever: f64,
+    /// Share of the tip's blurred rim.
+    tip: f64,
+    /// Share of the hub's blurred rim.
+    hub: f64,
+}
+
+/// What a pixel sees of a rotor at one angle.
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    /// Share of the pixel covered by the rotor, 0 to 1.
+    pub cover: f64,
+    /// Angle in radians by which the rotor may turn before this share changes; not positive: it changes now.
+    pub free: f64,
+}
+
+/// Blurred step: 0 below -1/2, 1 above 1/2.
+fn step(x: f64) -> f64 {
+    let u = (x + 0.5).clamp(0.0, 1.0);
+    u * u * (3.0 - 2.0 * u)
+}
+
+/// Nearest whole number; f64::round is a function call on the oldest x86-64.
+fn rounded(x: f64) -> f64 {
+    (x + 0.5f64.copysign(x)) as i64 as f64
+}
+
+impl Blades {
+    /// The outline of a rotor seen with a blur of `blur_px` (one standard deviation).
+    #[must_use]
+    pub fn new(rotor: &Rotor, blur_px: f64) -> Self {
+        let blades = f64::from(rotor.blades);
+        Self {
+            shape: rotor.shape,
+            blades,
+            pitch: TAU / blades,
+            odd_width: rotor.odd_width,
+            radius: rotor.radius_px,
+            hub: rotor.hub_radius_px(),
+            transition: TRANSITION_PER_SIGMA * blur_px,
+        }
+    }
+
+    /// Radius beyond which the rotor is invisible, in pixels.
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        self.radius + self.transition / 2.0
+    }
+
+    fn mark(&self) -> (f64, f64) {
+        (self.radius * 0.75, self.radius * 0.15 * (4.0 / self.blades).min(1.0))
+    }
+
+    /// What holds at a radius.
+    #[must_use]
+    pub fn ring(&self, r: f64) -> Ring {
+        let r = r.max(0.25);
+        let tip = step((self.radius - r) / self.transition);
+        let hub = step((self.hub - r) / self.transition);
+        let mut ring = Ring { r, half: None, bend: 0.0, lever: r, tip, hub };
+        // Half the width, in pixels; thinner where there are many blades.
+        let bar = |share: f64, enough: f64| self.radius * share * (enough / self.blades).min(1.0);
+        let half = match self.shape {
+            Shape::Straight => bar(0.12, 4.0) / r,
+            Shape::Tapered => bar(0.22, 3.0) * (1.0 - 0.55 * r / self.radius) / r,
+            Shape::Spokes => (self.radius * 0.02).max(0.6) / r,
+            Shape::Swept => {
+                let s = r / self.radius;
+                ring.bend = -0.6 * s * s;
+                let slope = 1.2 * s * s;
+                ring.lever = r / (1.0 + slope * slope).sqrt();
+                (0.45 * PI / self.blades).min(0.6)
+            }
+            Shape::Dot => {
+                let (m, d) = self.mark();
+                ring.tip = 1.0;
+                ring.hub = 0.0;
+                ring.lever = m;
+                let c = (r * r + m * m - d * d) / (2.0 * r * m);
+                if (r - m).abs() < d + self.transition / 2.0 {
+                    // Rings that only graze the mark's blurred rim have no edge, but they do see the mark.
+                    ring.half = Some(if (r - m).abs() < d { c.acos() } else { 0.0 });
+                }
+                return ring;
+            }
+        };
+        if ring.tip > 0.0 {
+            ring.half = Some(half.min(0.7 * PI / self.blades));
+        }
+        ring
+    }
+
+    /// What is seen at an angle relative to the first blade.
+    #[must_use]
+    pub fn look(&self, ring: &Ring, angle: f64) -> Look {
+        let never = Look { cover: ring.hub, free: f64::INFINITY };
+        let Some(half) = ring.half else { return never };
+        if ring.hub >= 1.0 {
+            return never;
+        }
+        let place = (angle - ring.bend) / self.pitch;
+        let nearest = rounded(place);
+        let off = (place - nearest) * self.pitch;
+        if self.odd_width == 1.0 {
+            // Blades cover at most 0.7 of the pitch: the nearest blade has the nearest edge.
+            let (cover, free) = self.blade(ring, half, 1.0, off.abs());
+            return Look { cover: ring.hub + (1.0 - ring.hub) * cover * ring.tip, free };
+        }
+        // With one narrow blade the neighbour's edge may be the nearer one.
+        let next = nearest + if off < 0.0 { -1.0 } else { 1.0 };
+        let (a, free_a) = self.blade(ring, half, self.width(nearest), off.abs());
+        let (b, free_b) = self.blade(ring, half, self.width(next), self.pitch - off.abs());
+        let blades = a.max(b) * ring.tip;
+        Look { cover: ring.hub + (1.0 - ring.hub) * blades, free: free_a.min(free_b) }
+    }
+
+    /// Cover by one blade whose middle is `off` radians away, and how far it may turn unseen.
+    fn blade(&self, ring: &Ring, half: f64, width: f64, off: f64) -> (f64, f64) {
+        if self.shape == Shape::Dot {
+            let (m, d) = self.mark();
+            let d = d * width;
+            let distance = (ring.r * ring.r + m * m - 2.0 * ring.r * m * off.cos()).max(0.0).sqrt();
+            let cover = step((d - distance) / self.transition);
+            return (cover, ((distance - d).abs() - self.transition / 2.0) / m);
+        }
+        let half = half * width;
+        let scale = ring.lever / self.transition;
+        let cover = step((half - off) * scale) + step((half + off) * scale) - 1.0;
+        (cover, (half - off).abs() - 0.5 / scale)
+    }
+
+    /// Width of a blade relative to the others.
+    fn width(&self, number: f64) -> f64 {
+        if number.rem_euclid(self.blades) == 0.0 { self.odd_width } else { 1.0 }
+    }
+
+    /// Angle of edge number `i` (even: leading) on a ring, or `None` where the blade does not reach.
+    #[must_use]
+    pub fn edge(&self, ring: &Ring, i: u32) -> Option<f64> {
+        let width = if i < 2 { self.odd_width } else { 1.0 };
+        let half = if self.shape == Shape::Dot {
+            let (m, d) = self.mark();
+            let d = d * width;
+            let c = (ring.r * ring.r + m * m - d * d) / (2.0 * ring.r * m);
+            ((ring.r - m).abs() < d).then(|| c.acos())?
+        } else {
+            let seen = ring.r > self.hub && ring.r < self.radius;
+            ring.half.filter(|_| seen)? * width
+        };
+        let middle = f64::from(i / 2) * self.pitch + ring.bend;
+        Some(if i.is_multiple_of(2) { middle + half } else { middle - half })
+    }
+
+    /// Number of edges of all blades.
+    #[must_use]
+    pub fn edge_count(&self) -> u32 {
+        self.blades as u32 * 2
+    }
+}
