@@ -12,7 +12,7 @@
 use heapless::Vec;
 
 use super::polar::Annulus;
-use crate::registration::{Icp, Residual, SlicePoint};
+use crate::registration::{Icp, Residual, Slice, SlicePoint};
 use crate::rotors::Disc;
 use crate::store::{WINDOW_SEGMENTS, Window};
 
@@ -21,9 +21,11 @@ const MOST_EVENTS: usize = 160;
 /// Events in a slice at least.
 const LEAST_EVENTS: usize = 24;
 /// Slices that a segment should hold.
-const SLICES: usize = 6;
+const SLICES: usize = 8;
 /// Most slices looked at.
-const MOST_SLICES: usize = 12;
+const MOST_SLICES: usize = 16;
+/// A later slice is cut from this share of the events before it, so that the baseline grows geometrically.
+const GROWTH: f32 = 0.4;
 /// A level may change the rate by this factor at most, else the match jumped to another blade.
 const MOST_CHANGE: f32 = 0.5;
 /// Motion of the rim between the slices that is larger than the noise of a registration.
@@ -58,31 +60,21 @@ pub fn ladder(
         return None;
     }
     let mut rest = placed();
-    icp.first.clear();
-    let mut first_us = 0.0_f32;
-    for (t_us, point) in rest.by_ref().take(size) {
-        icp.first.push(point).ok();
-        first_us += t_us as f32 / size as f32;
-    }
+    let (first_us, _) = take(&mut rest, size, size, &mut icp.first);
+    let mut passed = size;
     let mut rate: Option<f32> = None;
     // Whether the rate rests on a motion large enough to judge the next by.
     let mut seen = false;
     for _ in 0..MOST_SLICES {
-        icp.second.clear();
-        let (mut second_us, mut from_us, mut to_us) = (0.0_f32, None, 0);
-        for (t_us, point) in rest.by_ref().take(size) {
-            icp.second.push(point).ok();
-            second_us += t_us as f32 / size as f32;
-            from_us = from_us.or(Some(t_us));
-            to_us = t_us;
-        }
+        let length = size.max((GROWTH * passed as f32) as usize);
+        let (second_us, length_us) = take(&mut rest, length, size, &mut icp.second);
+        passed += length;
         let baseline_s = (second_us - first_us) * 1e-6;
-        let length_s = (to_us - from_us.unwrap_or(to_us)) as f32 * 1e-6;
-        let rate_so_far = rate.unwrap_or(0.0).abs();
-        if icp.second.len() < size
+        let rate_so_far = if seen { rate.unwrap_or(0.0).abs() } else { 0.0 };
+        if icp.second.len() < size / 2
             || baseline_s <= 0.0
             || rate_so_far * baseline_s > MOST_TURN_RAD
-            || rate_so_far * length_s > MOST_BLUR_RAD
+            || rate_so_far * length_us * 1e-6 > MOST_BLUR_RAD
         {
             break;
         }
@@ -101,6 +93,28 @@ pub fn ladder(
         rate = Some(next);
     }
     rate
+}
+
+/// Moves the next `length` events, thinned to about `most`, into a slice; their mean time and their span in us.
+fn take(
+    events: &mut impl Iterator<Item = (i32, SlicePoint)>,
+    length: usize,
+    most: usize,
+    slice: &mut Slice,
+) -> (f32, f32) {
+    slice.clear();
+    let (mut sum_us, mut from_us, mut to_us) = (0.0_f32, None, 0);
+    let mut next = 0;
+    for (index, (t_us, point)) in events.take(length).enumerate() {
+        if index * most >= next {
+            next += length;
+            slice.push(point).ok();
+            sum_us += t_us as f32;
+            from_us = from_us.or(Some(t_us));
+            to_us = t_us;
+        }
+    }
+    (sum_us / slice.len().max(1) as f32, (to_us - from_us.unwrap_or(to_us)) as f32)
 }
 
 /// The median of values, which it sorts.
