@@ -12,7 +12,9 @@ pub mod rotors;
 pub mod speed;
 pub mod store;
 pub mod tachometer;
+pub mod tracker;
 
 pub use event::{Event, Geometry, GyroSample, Polarity};
 pub use reading::{Direction, Evidence, Frame, Reading, Reason, RotorReading, Speed, Status};
-pub use tachometer::{Memory, Poll, Roi, Settings, StoredEvent, Tachometer};
+pub use store::StoredEvent;
+pub use tachometer::{Ignored, Memory, Poll, Roi, Settings, Tachometer};

@@ -15,8 +15,8 @@ pub const MAX_CLUSTERS: usize = 8;
 /// Lines of the spectrum that are looked into: each costs a coherence map.
 pub const MAX_LINES: usize = 8;
 
-/// Events of one rotor in polar coordinates: 4 096 x 8 B = 32 KiB.
-pub const POLAR_EVENTS: usize = 4_096;
+/// Events of one rotor in polar coordinates: 3 072 x 8 B = 24 KiB.
+pub const POLAR_EVENTS: usize = 3_072;
 
 /// Time bins of the scan: 1 024 x 8 B = 8 KiB. 150 ms / 1 024 = 146 us, Nyquist limit 3.4 kHz.
 pub const SCAN_BINS: usize = 1_024;

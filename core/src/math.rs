@@ -120,13 +120,14 @@ impl TurnRate {
 
 /// Quick functions for places where several percent of error change nothing.
 pub mod rough {
-    use micromath::F32Ext as _;
+    use micromath::F32Ext;
 
     /// Square root with up to 6 % error: for comparing dispersions of clusters, where a decision rests
     /// on differences of tens of percent.
     #[must_use]
     pub fn sqrt(x: f32) -> f32 {
-        x.sqrt()
+        // Named, as a method call would mean the standard library's wherever that is linked.
+        F32Ext::sqrt(x)
     }
 }
 

@@ -278,7 +278,7 @@ pub struct Reading {
     pub window_us: u32,
     /// Events that arrived in the window.
     pub events: u64,
-    /// Of these, events left out on purpose because the store is smaller than the window.
+    /// Of these, events left out on purpose: the store is smaller than the window.
     pub thinned: u64,
     /// Events that the sensor or the link reported lost in the window.
     pub lost: u64,

@@ -68,6 +68,8 @@ struct Segment {
     len: usize,
     counted: u64,
     lost: u64,
+    roll_sum_rad_s: f32,
+    roll_count: u32,
     /// The reservoir keeps every 2^stride_log2-th event.
     stride_log2: u8,
     /// Events to pass over before the next is kept.
@@ -78,7 +80,15 @@ impl Default for Segment {
     fn default() -> Self {
         // Where the octaves end, the reservoir goes on as densely as the last of them.
         let stride_log2 = (BURST_EIGHTHS - DENSE_EIGHTHS) as u8;
-        Self { len: 0, counted: 0, lost: 0, stride_log2, skip: 0 }
+        Self {
+            len: 0,
+            counted: 0,
+            lost: 0,
+            roll_sum_rad_s: 0.0,
+            roll_count: 0,
+            stride_log2,
+            skip: 0,
+        }
     }
 }
 
@@ -96,6 +106,7 @@ pub struct Store<'m> {
     /// Start of the oldest segment.
     start_us: u64,
     segment_us: u32,
+    thinned: u64,
 }
 
 impl<'m> Store<'m> {
@@ -110,6 +121,7 @@ impl<'m> Store<'m> {
             closed: 0,
             start_us: 0,
             segment_us: segment_us.max(1),
+            thinned: 0,
         }
     }
 
@@ -120,6 +132,12 @@ impl<'m> Store<'m> {
         self.closed = 0;
         self.start_us = start_us;
         self.segment_us = segment_us.max(1);
+    }
+
+    /// Events left out on purpose since the beginning.
+    #[must_use]
+    pub const fn thinned(&self) -> u64 {
+        self.thinned
     }
 
     /// Length of one segment in microseconds.
@@ -157,6 +175,7 @@ impl<'m> Store<'m> {
         segment.counted += 1;
         if segment.skip > 0 {
             segment.skip -= 1;
+            self.thinned += 1;
             return;
         }
         let base = slot * self.capacity;
@@ -169,6 +188,7 @@ impl<'m> Store<'m> {
             for i in 0..kept {
                 reservoir[i] = reservoir[2 * i];
             }
+            self.thinned += (segment.len - burst - kept) as u64;
             segment.len = burst + kept;
             segment.stride_log2 += 1;
         }
@@ -190,6 +210,89 @@ impl<'m> Store<'m> {
         self.segments[slot].lost += count;
     }
 
+    /// Makes segments longer, keeping what is stored: each new segment keeps the burst of the first old one in
+    /// it and thins the rest evenly. `segment_us` is at least the length so far. Cost: one pass over the store.
+    pub fn lengthen(&mut self, segment_us: u32) {
+        let old = core::array::from_fn::<Segment, SEGMENTS, _>(|i| self.segments[self.slot(i)]);
+        let old_us = u64::from(self.segment_us);
+        let elapsed_us = self.closed as u64 * old_us;
+        let burst = BURST_EIGHTHS * (self.capacity / 8);
+        let reservoir = self.capacity - burst;
+        let closed = (elapsed_us / u64::from(segment_us)) as usize;
+        // Reading runs ahead of writing: new segments start no earlier than old ones and hold fewer events.
+        let (mut from, mut index) = (0, 0);
+        for new in 0..=closed {
+            let end_us = (new as u64 + 1) * u64::from(segment_us);
+            let rest: usize = old
+                .iter()
+                .enumerate()
+                .take(self.closed + 1)
+                .skip(from)
+                .take_while(|(i, _)| (*i as u64 * old_us) < end_us)
+                .map(|(_, segment)| segment.len)
+                .sum();
+            let stride = rest.saturating_sub(index + burst).div_ceil(reservoir.max(1)).max(1);
+            let mut merged = Segment {
+                stride_log2: old[self.closed].stride_log2 + stride.ilog2() as u8,
+                ..Segment::default()
+            };
+            let base = self.slot(new) * self.capacity;
+            let mut passed = 0;
+            while from <= self.closed {
+                let source = self.slot(from) * self.capacity;
+                let segment = old[from];
+                // An old segment that is split gives each part of its count as it gives events.
+                let share =
+                    |index: usize| segment.counted * index as u64 / segment.len.max(1) as u64;
+                let before = index;
+                let mut ended = false;
+                while index < old[from].len {
+                    let event = self.events[source + index];
+                    if event.since(self.start_us) as i64 >= end_us as i64 {
+                        ended = true;
+                        break;
+                    }
+                    index += 1;
+                    let kept = merged.len < burst || passed % stride == 0;
+                    passed += usize::from(merged.len >= burst);
+                    if kept && merged.len < self.capacity {
+                        self.events[base + merged.len] = event;
+                        merged.len += 1;
+                    } else {
+                        self.thinned += 1;
+                    }
+                }
+                merged.counted += share(index) - share(before);
+                if ended {
+                    break;
+                }
+                if segment.len == 0 {
+                    merged.counted += segment.counted;
+                }
+                from += 1;
+                index = 0;
+            }
+            for (i, segment) in old.iter().enumerate().take(self.closed + 1) {
+                if (i as u64 * old_us) / u64::from(segment_us) == new as u64 {
+                    merged.lost += segment.lost;
+                    merged.roll_sum_rad_s += segment.roll_sum_rad_s;
+                    merged.roll_count += segment.roll_count;
+                }
+            }
+            let slot = self.slot(new);
+            self.segments[slot] = merged;
+        }
+        self.closed = closed;
+        self.segment_us = segment_us;
+    }
+
+    /// Takes in the camera's roll rate, positive = the scene turns clockwise on the screen.
+    pub fn roll(&mut self, roll_rad_s: f32) {
+        let slot = self.slot(self.closed);
+        self.segments[slot].roll_sum_rad_s += roll_rad_s;
+        self.segments[slot].roll_count += 1;
+    }
+
     /// Closes the open segment and opens the next. The ring must not be [`Self::full`].
     pub fn close_segment(&mut self) {
         debug_assert!(!self.full());
@@ -208,9 +311,9 @@ impl<'m> Store<'m> {
     }
 
     /// The window over the oldest `segments` segments (the open one counts as the last when all closed
-    /// ones are taken).
+    /// ones are taken), no longer than to `end_us`.
     #[must_use]
-    pub fn window(&self, segments: usize) -> Window<'_> {
+    pub fn window(&self, segments: usize, end_us: u64) -> Window<'_> {
         let mut parts: [&[StoredEvent]; SEGMENTS] = [&[]; SEGMENTS];
         let segments = segments.min(self.closed + 1);
         for (index, part) in parts.iter_mut().enumerate().take(segments) {
@@ -221,7 +324,8 @@ impl<'m> Store<'m> {
         Window {
             parts,
             start_us: self.start_us,
-            duration_us: self.segment_us * segments as u32,
+            duration_us: (self.segment_us * segments as u32)
+                .min(end_us.saturating_sub(self.start_us).min(u64::from(u32::MAX)) as u32),
             segments,
         }
     }
@@ -235,13 +339,15 @@ impl<'m> Store<'m> {
             account.counted += segment.counted;
             account.kept += segment.len as u64;
             account.lost += segment.lost;
+            account.roll_sum_rad_s += segment.roll_sum_rad_s;
+            account.roll_count += segment.roll_count;
         }
         account
     }
 }
 
 /// Where the events of a window went.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Account {
     /// Arrived.
     pub counted: u64,
@@ -249,6 +355,18 @@ pub struct Account {
     pub kept: u64,
     /// Reported lost by the sensor or the link.
     pub lost: u64,
+    /// Sum of the camera's roll rates.
+    roll_sum_rad_s: f32,
+    /// Number of roll rates.
+    roll_count: u32,
+}
+
+impl Account {
+    /// Mean roll rate of the camera in rad/s, where a gyro was heard.
+    #[must_use]
+    pub fn roll_rad_s(&self) -> Option<f32> {
+        (self.roll_count > 0).then(|| self.roll_sum_rad_s / self.roll_count as f32)
+    }
 }
 
 /// The stored events of a stretch of time, in time order.
@@ -294,11 +412,7 @@ impl<'a> Window<'a> {
     }
 
     /// Events with `from_us <= t < to_us`, both in microseconds since the window's start. O(log n).
-    pub fn between(
-        &self,
-        from_us: i32,
-        to_us: i32,
-    ) -> impl Iterator<Item = StoredEvent> + use<'a> {
+    pub fn between(&self, from_us: i32, to_us: i32) -> impl Iterator<Item = StoredEvent> + use<'a> {
         let start_us = self.start_us;
         let parts = self.parts;
         parts.into_iter().take(self.segments).flat_map(move |part| {
@@ -306,5 +420,61 @@ impl<'a> Window<'a> {
             let to = part.partition_point(|event| event.since(start_us) < to_us);
             part[from..to.max(from)].iter().copied()
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn event(t_us: u64) -> Event {
+        Event { t_us, x: (t_us % 300) as u16, y: 7, polarity: Polarity::On }
+    }
+
+    fn fill(store: &mut Store<'_>, times: impl Iterator<Item = u64>) {
+        for t_us in times {
+            while t_us >= store.open_end_us() {
+                store.close_segment();
+            }
+            store.push(&event(t_us));
+        }
+    }
+
+    fn times(store: &Store<'_>) -> Vec<i32> {
+        store.window(SEGMENTS, u64::MAX).events().map(|event| event.since(0)).collect()
+    }
+
+    #[test]
+    fn a_segment_keeps_a_dense_burst_then_thins_evenly_and_counts_all() {
+        let mut memory = [StoredEvent::default(); 64 * SEGMENTS];
+        let mut store = Store::new(&mut memory, 100_000);
+        fill(&mut store, 0..5_000);
+        let kept = times(&store);
+        assert_eq!(&kept[..16], &(0..16).collect::<Vec<_>>()[..]);
+        assert!(kept.windows(2).all(|pair| pair[0] < pair[1]));
+        assert!(kept.len() <= 64 && kept.len() > 48);
+        assert!(*kept.last().unwrap_or(&0) > 4_500);
+        let account = store.account(1);
+        assert_eq!((account.counted, account.kept), (5_000, kept.len() as u64));
+    }
+
+    #[test]
+    fn lengthening_keeps_order_counts_and_the_first_burst() {
+        let mut memory = [StoredEvent::default(); 64 * SEGMENTS];
+        let mut store = Store::new(&mut memory, 1_000);
+        fill(&mut store, (0..6_500).step_by(3));
+        let before = store.account(SEGMENTS);
+        assert_eq!(store.closed(), 6);
+        for segment_us in [2_000, 2_700, 5_400] {
+            store.lengthen(segment_us);
+            let kept = times(&store);
+            assert!(kept.windows(2).all(|pair| pair[0] < pair[1]), "{kept:?}");
+            assert_eq!(&kept[..4], &[0, 3, 6, 9]);
+            assert!(*kept.last().unwrap_or(&0) > 6_000);
+            assert_eq!(store.account(SEGMENTS).counted, before.counted);
+        }
+        assert_eq!(store.closed(), 1);
+        fill(&mut store, 6_500..40_000);
+        assert!(times(&store).windows(2).all(|pair| pair[0] < pair[1]));
     }
 }

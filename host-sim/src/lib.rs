@@ -1,4 +1,5 @@
 //! Recordings, synthesiser and reports around `evtach-core`.
 
+pub mod measure;
 pub mod recording;
 pub mod synth;

@@ -63,11 +63,9 @@ impl Icp {
     ) -> Option<Registered> {
         let reach_px = 1.2 * radius_px;
         self.grid.build(&self.second, reach_px);
-        let there =
-            one_way(&self.first, &self.second, &self.grid, start_rad, radius_px, residual)?;
+        let there = one_way(&self.first, &self.second, &self.grid, start_rad, radius_px, residual)?;
         self.grid.build(&self.first, reach_px);
-        let back =
-            one_way(&self.second, &self.first, &self.grid, -start_rad, radius_px, residual)?;
+        let back = one_way(&self.second, &self.first, &self.grid, -start_rad, radius_px, residual)?;
         Some(Registered {
             yaw_rad: 0.5 * (there.yaw_rad - back.yaw_rad),
             matched: 0.5 * (there.matched + back.matched),

@@ -42,10 +42,7 @@ pub struct Coherence {
 
 impl Default for Coherence {
     fn default() -> Self {
-        Self {
-            sums: [[(0.0, 0.0); COHERENCE_CELLS]; 2],
-            counts: [[0; COHERENCE_CELLS]; 2],
-        }
+        Self { sums: [[(0.0, 0.0); COHERENCE_CELLS]; 2], counts: [[0; COHERENCE_CELLS]; 2] }
     }
 }
 

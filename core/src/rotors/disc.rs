@@ -178,7 +178,8 @@ mod tests {
         let half = heat(|x, y| (x - 150.0).powi(2) + (y - 120.0).powi(2) < 3600.0 && x > 150.0);
         assert!(one(&half).lopsided > 0.1);
         let pair = heat(|x, y| {
-            ((x - 110.0).powi(2) + (y - 120.0).powi(2)).min((x - 190.0).powi(2) + (y - 120.0).powi(2))
+            ((x - 110.0).powi(2) + (y - 120.0).powi(2))
+                .min((x - 190.0).powi(2) + (y - 120.0).powi(2))
                 < 900.0
         });
         assert!(one(&pair).lopsided > 0.3);

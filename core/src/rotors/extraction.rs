@@ -17,7 +17,7 @@ use super::disc::{Candidate, Disc, candidate};
 use super::heat::CellGrid;
 use super::kmeans::{Cluster, KMeans, Seeding, davies_bouldin, nearest};
 use super::winding::{Winding, collect, explain};
-use crate::limits::{COHERENCE_CELLS, MAX_CANDIDATES, MAX_CLUSTERS, MAX_LINES, MAX_ROTORS};
+use crate::limits::{COHERENCE_CELLS, MAX_CANDIDATES, MAX_CLUSTERS, MAX_LINES};
 use crate::math::{TAU, sqrt};
 use crate::speed::polar::{PolarTrack, track};
 use crate::speed::scan::{Peak, Scanner};
@@ -57,13 +57,6 @@ pub struct Found {
     pub explained: f32,
 }
 
-/// Why nothing was found, when nothing was.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Misses {
-    /// Strongest line that was all in step, in Hz: a lamp.
-    pub in_step_hz: Option<f32>,
-}
-
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Stage {
     #[default]
@@ -91,15 +84,12 @@ pub struct Extraction {
     whole: Option<Found>,
     /// Rotors by every line: the same one may stand here by several of its lines.
     candidates: Vec<Found, MAX_CANDIDATES>,
-    found: Vec<Found, MAX_ROTORS>,
-    misses: Misses,
+    in_step_hz: Option<f32>,
 }
 
 /// Memory that an extraction works in.
 #[derive(Debug)]
 pub struct Scratch {
-    /// Spectrum of one tile.
-    pub scanner: Scanner,
     /// Map of one line.
     pub coherence: Coherence,
     /// Its heat.
@@ -111,7 +101,6 @@ pub struct Scratch {
 impl Default for Scratch {
     fn default() -> Self {
         Self {
-            scanner: Scanner::default(),
             coherence: Coherence::default(),
             map: [0; COHERENCE_CELLS],
             map_weights: [0; COHERENCE_CELLS],
@@ -128,7 +117,7 @@ pub struct View<'a> {
     pub grid: CellGrid,
     /// Grid of the coherence map.
     pub map_grid: CellGrid,
-    /// Weights of the heat map, see [`weigh`].
+    /// Weights of the heat map, see [`weigh_heat`].
     pub weights: &'a [u8],
 }
 
@@ -138,25 +127,27 @@ impl Extraction {
         *self = Self::default();
     }
 
-    /// One bounded piece of work; `true` once [`Self::found`] stands.
-    pub fn step(&mut self, view: &View<'_>, track: &mut PolarTrack, scratch: &mut Scratch) -> bool {
+    /// One bounded piece of work; `true` once [`Self::candidates`] stand.
+    pub fn step(
+        &mut self,
+        view: &View<'_>,
+        track: &mut PolarTrack,
+        scanner: &mut Scanner,
+        scratch: &mut Scratch,
+    ) -> bool {
         match self.stage {
             Stage::Weigh => {
-                self.kmeans = KMeans::seed(
-                    view.grid,
-                    view.weights,
-                    MAX_CLUSTERS,
-                    Seeding::FarthestNearest,
-                );
+                self.kmeans =
+                    KMeans::seed(view.grid, view.weights, MAX_CLUSTERS, Seeding::FarthestNearest);
                 self.stage = Stage::Tiles;
             }
             Stage::Tiles => {
                 if self.kmeans.sweep(view.grid, view.weights) {
                     self.stage = Stage::Spectrum;
-                    self.start_tile(view, track, scratch);
+                    self.start_tile(view, track, scanner);
                 }
             }
-            Stage::Spectrum => self.spectrum(view, track, scratch),
+            Stage::Spectrum => self.spectrum(view, track, scanner),
             Stage::Map => self.map(view, scratch),
             Stage::Split => self.split(view, scratch),
             Stage::Done => {}
@@ -164,14 +155,33 @@ impl Extraction {
         self.stage == Stage::Done
     }
 
-    /// The rotors, and what was seen instead.
+    /// Name of the stage that the next step belongs to.
     #[must_use]
-    pub fn found(&self) -> (&[Found], Misses) {
-        (&self.found, self.misses)
+    pub const fn stage(&self) -> &'static str {
+        match self.stage {
+            Stage::Weigh | Stage::Tiles => "tiles",
+            Stage::Spectrum => "spectrum",
+            Stage::Map => "map",
+            Stage::Split => "split",
+            Stage::Done => "done",
+        }
     }
 
-    fn start_tile(&mut self, view: &View<'_>, polar: &mut PolarTrack, scratch: &mut Scratch) {
-        scratch.scanner.restart();
+    /// Rotors by every line, those that explain most events first: whoever takes one leaves out those that
+    /// overlap it.
+    #[must_use]
+    pub fn candidates(&self) -> &[Found] {
+        &self.candidates
+    }
+
+    /// Frequency in Hz of the strongest line that was in step all over: a lamp.
+    #[must_use]
+    pub const fn in_step_hz(&self) -> Option<f32> {
+        self.in_step_hz
+    }
+
+    fn start_tile(&mut self, view: &View<'_>, polar: &mut PolarTrack, scanner: &mut Scanner) {
+        scanner.restart();
         polar.clear();
         let clusters = self.kmeans.clusters();
         if let Some(tile) = candidate(view.grid, view.weights, clusters, self.tile) {
@@ -179,20 +189,20 @@ impl Extraction {
         }
     }
 
-    fn spectrum(&mut self, view: &View<'_>, track: &mut PolarTrack, scratch: &mut Scratch) {
+    fn spectrum(&mut self, view: &View<'_>, track: &mut PolarTrack, scanner: &mut Scanner) {
         if self.tile >= self.kmeans.clusters().len() {
             self.lines.sort_unstable_by(|a, b| b.power.total_cmp(&a.power));
             self.stage = Stage::Map;
             return;
         }
         let window_us = view.window.duration_us;
-        scratch.scanner.step(track, window_us);
-        if scratch.scanner.harmonic() >= TILE_HARMONICS {
-            for peak in scratch.scanner.peaks() {
+        scanner.step(track, window_us);
+        if scanner.harmonic() >= TILE_HARMONICS {
+            for peak in scanner.peaks() {
                 self.add_line(*peak, 1.5e6 / window_us as f32);
             }
             self.tile += 1;
-            self.start_tile(view, track, scratch);
+            self.start_tile(view, track, scanner);
         }
     }
 
@@ -217,7 +227,9 @@ impl Extraction {
     /// Fills the map of the next line and asks whether one rotation explains it all.
     fn map(&mut self, view: &View<'_>, scratch: &mut Scratch) {
         let Some(line) = self.lines.get(self.line) else {
-            self.choose();
+            // A piece of a rotor, or a rotor by the line of its neighbour, explains fewer events than the rotor by
+            // its own line.
+            self.candidates.sort_unstable_by(|a, b| b.explained.total_cmp(&a.explained));
             self.stage = Stage::Done;
             return;
         };
@@ -239,8 +251,8 @@ impl Extraction {
         {
             let (region, total) = collect(phasors(), |p| inside(p, &all));
             let winding = explain(&region, all.disc);
-            if winding.windings == 0 && winding.share > SHARE_OF_ONE && self.misses.in_step_hz.is_none() {
-                self.misses.in_step_hz = Some(line_hz);
+            if winding.windings == 0 && winding.share > SHARE_OF_ONE {
+                self.in_step_hz = self.in_step_hz.or(Some(line_hz));
             }
             self.whole = believe(&winding, (&region, total), &all, line_hz);
         } else {
@@ -280,9 +292,8 @@ impl Extraction {
             let Some(part) = candidate(grid, weights, &self.best, index) else { continue };
             let phasors = scratch.coherence.phasors(grid);
             let best = &self.best;
-            let (region, total) = collect(phasors, |p| {
-                inside(p, &part) && nearest(best, p.x_px, p.y_px).0 == index
-            });
+            let (region, total) =
+                collect(phasors, |p| inside(p, &part) && nearest(best, p.x_px, p.y_px).0 == index);
             let winding = explain(&region, part.disc);
             if let Some(one) = believe(&winding, (&region, total), &part, line_hz) {
                 turning.push(one).ok();
@@ -308,17 +319,6 @@ impl Extraction {
             && candidate.explained > least.explained
         {
             *least = candidate;
-        }
-    }
-
-    /// Chooses rotors that stand apart, those that explain most events first: a piece of a rotor, or a rotor by
-    /// the line of its neighbour, explains fewer than the rotor by its own.
-    fn choose(&mut self) {
-        self.candidates.sort_unstable_by(|a, b| b.explained.total_cmp(&a.explained));
-        for candidate in &self.candidates {
-            if !self.found.iter().any(|rotor| rotor.disc.overlaps(&candidate.disc)) {
-                self.found.push(*candidate).ok();
-            }
         }
     }
 }
@@ -364,7 +364,8 @@ fn rim(region: &[Phasor], axis: &Disc) -> f32 {
     // Bisection instead of a sort: the region is not ours to reorder.
     for _ in 0..12 {
         let middle = 0.5 * (low + high);
-        let within: f32 = region.iter().filter(|p| distance(p) <= middle).map(|p| p.amplitude).sum();
+        let within: f32 =
+            region.iter().filter(|p| distance(p) <= middle).map(|p| p.amplitude).sum();
         if within < 0.95 * total { low = middle } else { high = middle }
     }
     high

@@ -92,12 +92,8 @@ impl Pairs {
         let room_us = (window.duration_us as f32 - baseline_us - span_us).max(0.0);
         let start_us = room_us * self.next as f32 / (self.pairs.max(2) - 1) as f32;
         let annulus = Annulus::of(self.pace.disc);
-        let mut cut = Cut {
-            start_us,
-            length_us: SLICE_PERIODS * period_us,
-            period_us,
-            folds: self.folds,
-        };
+        let mut cut =
+            Cut { start_us, length_us: SLICE_PERIODS * period_us, period_us, folds: self.folds };
         cut.collect(window, &annulus, &mut icp.first);
         cut.start_us += baseline_us;
         cut.collect(window, &annulus, &mut icp.second);

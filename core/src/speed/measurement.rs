@@ -15,6 +15,10 @@ use crate::store::{WINDOW_SEGMENTS, Window};
 
 /// Steps of centre and speed by the polar phase.
 const NEWTON_STEPS: u8 = 6;
+/// The same for a rotor that is followed from window to window.
+const FOLLOWING_STEPS: u8 = 2;
+/// Relative error of the speed of a rotor that is followed, after these steps.
+const FOLLOWING_SIGMA: f32 = 1e-3;
 /// A rotor keeps at least this share of its events in step.
 const LEAST_COHERENCE: f32 = 0.3;
 /// Power of the scan over chance, per window.
@@ -37,6 +41,8 @@ const LOCK_REVOLUTIONS: f32 = 2.0;
 const COARSE_PERIODS: f32 = 0.8;
 /// Symmetry below which parts differ so much that baselines are whole revolutions.
 const ALIKE_SCORE: f32 = 0.85;
+/// Segments that the initial alignment looks at.
+const LADDERS: usize = 3;
 /// Slice pairs: refinement, lock, fractional-baseline test.
 const REFINEMENT_PAIRS: u32 = 12;
 const LOCK_PAIRS: u32 = 8;
@@ -89,21 +95,14 @@ enum Stage {
     Done,
 }
 
-/// Memory that a measurement works in.
-#[derive(Debug, Default)]
-pub struct Scratch {
-    /// Slices and grid.
-    pub icp: Icp,
-    /// Spectrum.
-    pub scanner: Scanner,
-}
-
 /// The measurement of one rotor.
 #[derive(Debug)]
 pub struct Measurement {
     stage: Stage,
     /// Repetitions of the stage.
     turn: u8,
+    /// Whether the rotor was locked in the window before.
+    follows: bool,
     /// Whether the scan has already sent the measurement back once.
     second_look: bool,
     disc: Disc,
@@ -131,6 +130,7 @@ impl Measurement {
         Self {
             stage: Stage::Newton,
             turn: 0,
+            follows: false,
             second_look: false,
             disc: found.disc,
             omega_rad_s: found.omega_rad_s,
@@ -150,23 +150,36 @@ impl Measurement {
         }
     }
 
+    /// Starts the measurement of a rotor that was locked in the window before: its speed and blade count are
+    /// known, so that the lock follows at once. The witnesses of the lock must still agree.
+    #[must_use]
+    pub fn follow(found: &Found, parts: Option<u8>, alike: bool) -> Self {
+        let mut following = Self::new(found);
+        following.follows = true;
+        following.turn = NEWTON_STEPS - FOLLOWING_STEPS;
+        following.parts = parts;
+        following.alike = alike;
+        following
+    }
+
     /// One bounded piece of work; `true` once the result stands.
     pub fn step(
         &mut self,
         window: &Window<'_>,
         stated: &Stated,
         polar: &mut PolarTrack,
-        scratch: &mut Scratch,
+        scanner: &mut Scanner,
+        icp: &mut Icp,
     ) -> bool {
         match self.stage {
-            Stage::Newton => self.newton(window, polar, scratch),
-            Stage::Scan => self.scan(window, polar, scratch),
+            Stage::Newton => self.newton(window, polar, scanner),
+            Stage::Scan => self.scan(window, polar, scanner),
             Stage::Symmetry => self.symmetry(stated, polar),
-            Stage::Initial => self.initial(window, scratch),
-            Stage::Refinement => self.refinement(window, scratch),
-            Stage::Further => self.further(window, scratch),
-            Stage::Lock => self.lock(window, scratch),
-            Stage::Fractional => self.fractional(window, scratch),
+            Stage::Initial => self.initial(window, icp),
+            Stage::Refinement => self.refinement(window, icp),
+            Stage::Further => self.further(window, icp),
+            Stage::Lock => self.lock(window, icp),
+            Stage::Fractional => self.fractional(window, icp),
             Stage::Phase => self.phase(window, stated, polar),
             Stage::Done => {}
         }
@@ -196,7 +209,7 @@ impl Measurement {
     }
 
     /// Centre and speed by the polar phase, a Newton step at a time.
-    fn newton(&mut self, window: &Window<'_>, polar: &mut PolarTrack, scratch: &mut Scratch) {
+    fn newton(&mut self, window: &Window<'_>, polar: &mut PolarTrack, scanner: &mut Scanner) {
         self.events = track(window, self.disc, polar);
         self.evidence.events = self.events as u32;
         if self.events < LEAST_EVENTS {
@@ -219,16 +232,32 @@ impl Measurement {
         if coherence < LEAST_COHERENCE {
             return self.refuse(Reason::NoRotation);
         }
-        scratch.scanner.restart();
+        if self.follows {
+            self.count_periods(window);
+            self.plan_lock(window, self.omega_rad_s.abs() * FOLLOWING_SIGMA);
+            self.stage = Stage::Lock;
+            return;
+        }
+        scanner.restart();
         self.stage = Stage::Scan;
     }
 
+    /// Symmetry periods in the window, and the window that a lock needs.
+    fn count_periods(&mut self, window: &Window<'_>) -> f32 {
+        let revolutions = self.omega_rad_s.abs() * window.duration_us as f32 * 1e-6 / TAU;
+        let periods = revolutions * f32::from(self.parts.unwrap_or(1));
+        self.evidence.periods = Some(periods);
+        let short = (LOCK_PERIODS / periods).max(LOCK_REVOLUTIONS / revolutions);
+        self.wanted_us = short * window.duration_us as f32;
+        periods
+    }
+
     /// Scan over harmonic and frequency about the refined centre: first coarse witness.
-    fn scan(&mut self, window: &Window<'_>, polar: &PolarTrack, scratch: &mut Scratch) {
-        if !scratch.scanner.step(polar, window.duration_us) {
+    fn scan(&mut self, window: &Window<'_>, polar: &PolarTrack, scanner: &mut Scanner) {
+        if !scanner.step(polar, window.duration_us) {
             return;
         }
-        let Some(scan) = scratch.scanner.finish(polar, window.duration_us) else {
+        let Some(scan) = scanner.finish(polar, window.duration_us) else {
             return self.refuse(Reason::NoRotation);
         };
         let Scan { omega_rad_s, score, standing, .. } = scan;
@@ -272,11 +301,11 @@ impl Measurement {
     }
 
     /// Initial alignment in every other segment: second coarse witness.
-    fn initial(&mut self, window: &Window<'_>, scratch: &mut Scratch) {
-        let segment = 2 * usize::from(self.turn);
-        if segment < window.segments().min(WINDOW_SEGMENTS) {
-            let mut climb =
-                |residual| ladder(window, segment, self.disc, residual, &mut scratch.icp);
+    fn initial(&mut self, window: &Window<'_>, icp: &mut Icp) {
+        let segments = window.segments().min(WINDOW_SEGMENTS);
+        let segment = usize::from(self.turn) * segments.div_ceil(LADDERS).max(1);
+        if segment < segments {
+            let mut climb = |residual| ladder(window, segment, self.disc, residual, icp);
             if let Some(rate) = climb(Residual::FixedAxis) {
                 self.rates.push(rate).ok();
             }
@@ -299,16 +328,13 @@ impl Measurement {
             self.evidence.free_axis_rad_s = Some(free);
             self.evidence.free_axis_sigma_rad_s = Some(error);
             let apart = (free - self.omega_rad_s).abs();
-            if apart > FREE_AXIS_SIGMAS * error && apart > FREE_AXIS_AGREEMENT * self.omega_rad_s.abs() {
+            if apart > FREE_AXIS_SIGMAS * error
+                && apart > FREE_AXIS_AGREEMENT * self.omega_rad_s.abs()
+            {
                 return self.refuse(Reason::Ambiguous);
             }
         }
-        let window_s = window.duration_us as f32 * 1e-6;
-        let revolutions = self.omega_rad_s.abs() * window_s / TAU;
-        let periods = revolutions * f32::from(self.parts.unwrap_or(1));
-        self.evidence.periods = Some(periods);
-        let short = (LOCK_PERIODS / periods).max(LOCK_REVOLUTIONS / revolutions);
-        self.wanted_us = short * window.duration_us as f32;
+        let periods = self.count_periods(window);
         if periods < COARSE_PERIODS {
             return self.refuse(Reason::TooSlow);
         }
@@ -338,14 +364,14 @@ impl Measurement {
     }
 
     /// Advances the planned pairs; the finished set once all are registered.
-    fn advance(&mut self, window: &Window<'_>, scratch: &mut Scratch) -> Option<Pairs> {
+    fn advance(&mut self, window: &Window<'_>, icp: &mut Icp) -> Option<Pairs> {
         let pairs = self.pairs.as_mut()?;
-        if pairs.step(window, &mut scratch.icp) { self.pairs.take() } else { None }
+        if pairs.step(window, icp) { self.pairs.take() } else { None }
     }
 
     /// The paper's refinement: step extended to 0.8 of half an angle of symmetry.
-    fn refinement(&mut self, window: &Window<'_>, scratch: &mut Scratch) {
-        let Some(pairs) = self.advance(window, scratch) else { return };
+    fn refinement(&mut self, window: &Window<'_>, icp: &mut Icp) {
+        let Some(pairs) = self.advance(window, icp) else { return };
         let Some(refined) = pairs.median() else {
             self.stage = Stage::Phase;
             return;
@@ -365,8 +391,8 @@ impl Measurement {
     }
 
     /// The paper's further refinement, kept to show what it gains.
-    fn further(&mut self, window: &Window<'_>, scratch: &mut Scratch) {
-        let Some(pairs) = self.advance(window, scratch) else { return };
+    fn further(&mut self, window: &Window<'_>, icp: &mut Icp) {
+        let Some(pairs) = self.advance(window, icp) else { return };
         self.evidence.further_rad_s = pairs.median().map(|found| found.omega_rad_s);
         self.plan_lock(window, self.omega_rad_s.abs() * 0.01);
         self.stage = Stage::Lock;
@@ -387,8 +413,8 @@ impl Measurement {
     }
 
     /// Long-baseline lock.
-    fn lock(&mut self, window: &Window<'_>, scratch: &mut Scratch) {
-        let Some(pairs) = self.advance(window, scratch) else { return };
+    fn lock(&mut self, window: &Window<'_>, icp: &mut Icp) {
+        let Some(pairs) = self.advance(window, icp) else { return };
         let longest = pairs.periods();
         if let Some(found) = pairs.mean() {
             self.evidence.lock_rad_s = Some(found.omega_rad_s);
@@ -405,8 +431,8 @@ impl Measurement {
     }
 
     /// Fractional-baseline test: an alias fits at whole periods and nowhere between.
-    fn fractional(&mut self, window: &Window<'_>, scratch: &mut Scratch) {
-        let Some(pairs) = self.advance(window, scratch) else { return };
+    fn fractional(&mut self, window: &Window<'_>, icp: &mut Icp) {
+        let Some(pairs) = self.advance(window, icp) else { return };
         self.evidence.fractional_deviation = pairs.deviation();
         self.stage = Stage::Phase;
     }
@@ -414,8 +440,7 @@ impl Measurement {
     /// Polar phase: second witness of the lock; then the verdict.
     fn phase(&mut self, window: &Window<'_>, stated: &Stated, polar: &mut PolarTrack) {
         track(window, self.disc, polar);
-        let found =
-            slope(polar, self.disc, self.omega_rad_s, self.harmonic, window.duration_us);
+        let found = slope(polar, self.disc, self.omega_rad_s, self.harmonic, window.duration_us);
         if let Some(found) = found {
             self.evidence.phase_rad_s = Some(found.speed.omega_rad_s);
             self.evidence.phase_sigma_rad_s = Some(found.speed.sigma_rad_s);
@@ -438,9 +463,8 @@ impl Measurement {
         let window_s = window.duration_us as f32 * 1e-6;
         if let (Some(lock), Some(phase)) = (lock, phase) {
             let apart = (lock.omega_rad_s - phase.omega_rad_s).abs();
-            let sigma = sqrt(
-                lock.sigma_rad_s * lock.sigma_rad_s + phase.sigma_rad_s * phase.sigma_rad_s,
-            );
+            let sigma =
+                sqrt(lock.sigma_rad_s * lock.sigma_rad_s + phase.sigma_rad_s * phase.sigma_rad_s);
             let agree = apart < (LOCK_AGREEMENT * lock.omega_rad_s.abs()).max(LOCK_SIGMAS * sigma);
             let whole = self.evidence.fractional_deviation.is_some_and(|d| d < MOST_DEVIATION);
             let both = combine(lock, phase);
@@ -463,23 +487,49 @@ impl Measurement {
         self.estimate.sigma_rad_s = sqrt(own * own + clock * clock + roll * roll);
     }
 
-    /// Status, disc, blade count, speed and evidence, once [`Self::step`] has returned `true`.
+    /// The result, once [`Self::step`] has returned `true`.
     #[must_use]
-    pub fn result(&self) -> (Status, Disc, Option<u8>, Option<Speed>, Evidence) {
+    pub fn result(&self) -> Outcome {
         let speed = self.status.reason().is_none().then_some(Speed {
             omega_rad_s: self.estimate.omega_rad_s,
             omega_sigma_rad_s: self.estimate.sigma_rad_s,
             alpha_rad_s2: self.alpha_rad_s2,
             frame: Frame::Camera,
         });
-        (self.status, self.disc, self.parts, speed, self.evidence)
+        Outcome {
+            status: self.status,
+            found: Found {
+                disc: self.disc,
+                omega_rad_s: self.omega_rad_s,
+                windings: self.harmonic,
+                ..Found::default()
+            },
+            parts: self.parts,
+            alike: self.alike,
+            speed,
+            evidence: self.evidence,
+            wanted_us: self.wanted_us,
+        }
     }
+}
 
+/// Result of a measurement.
+#[derive(Clone, Copy, Debug)]
+pub struct Outcome {
+    /// How far the measurement got.
+    pub status: Status,
+    /// Refined axis and speed, to follow the rotor from.
+    pub found: Found,
+    /// Equal parts, where known.
+    pub parts: Option<u8>,
+    /// Whether the parts are alike.
+    pub alike: bool,
+    /// Speed, unless refused.
+    pub speed: Option<Speed>,
+    /// What each stage found.
+    pub evidence: Evidence,
     /// Window in microseconds that a lock needs, 0 when the speed is not known.
-    #[must_use]
-    pub const fn wanted_us(&self) -> f32 {
-        self.wanted_us
-    }
+    pub wanted_us: f32,
 }
 
 /// Mean weighted by the inverse variances. The witnesses look at the same events, so the error is not taken to

@@ -111,8 +111,7 @@ pub fn newton(
         let (sin_psi, cos_psi) = psi.sin_cos();
         let (sin, cos) = event.angle().sin_cos();
         let lever = m * disc.radius_px / event.radius_px().max(1.0);
-        let a =
-            Vector4::new(-sin * lever, cos * lever, m * event.t_us as f32 * per_us, m);
+        let a = Vector4::new(-sin * lever, cos * lever, m * event.t_us as f32 * per_us, m);
         normal.ger(1.0, &a, &a, 1.0);
         right += a * sin_psi;
         in_step += cos_psi;
@@ -169,7 +168,8 @@ pub fn slope(
     let half_us = (window_us / 2) as i32;
     let mut blocks = [Block::default(); BLOCKS];
     for event in track {
-        let place = (event.t_us + half_us).max(0) as u64 * BLOCKS as u64 / u64::from(window_us.max(1));
+        let place =
+            (event.t_us + half_us).max(0) as u64 * BLOCKS as u64 / u64::from(window_us.max(1));
         let block = &mut blocks[(place as usize).min(BLOCKS - 1)];
         let psi = phase(*event, rate, harmonic).minus(turns[bank(*event, disc)]);
         let (sin_psi, cos_psi) = psi.sin_cos();
@@ -190,10 +190,10 @@ pub fn slope(
             continue;
         }
         // A prior worth a tenth of the block's own weight at the rim.
-        let prior = 0.1 * block.count as f32 * share * m * m
-            / (disc.radius_px * disc.radius_px)
+        let prior = 0.1 * block.count as f32 * share * m * m / (disc.radius_px * disc.radius_px)
             * (1.0 / SHIFT_PRIOR_PX);
-        let damped = block.normal * share + Matrix3::from_diagonal(&Vector3::new(0.0, prior, prior));
+        let damped =
+            block.normal * share + Matrix3::from_diagonal(&Vector3::new(0.0, prior, prior));
         let solved = damped.cholesky()?.solve(&block.right);
         let time_s = block.time_us / block.count as f32 * 1e-6;
         points.push((time_s, solved[0], block.in_step)).ok();

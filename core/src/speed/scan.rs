@@ -67,11 +67,7 @@ pub struct Scanner {
 
 impl Default for Scanner {
     fn default() -> Self {
-        Self {
-            spectrum: [Complex32::new(0.0, 0.0); SCAN_BINS],
-            peaks: Vec::new(),
-            harmonic: 0,
-        }
+        Self { spectrum: [Complex32::new(0.0, 0.0); SCAN_BINS], peaks: Vec::new(), harmonic: 0 }
     }
 }
 

@@ -20,9 +20,8 @@ pub fn mean_and_error(values: &[f32]) -> Option<(f32, f32)> {
 /// although sigma itself was estimated from few values.
 #[must_use]
 pub fn student_over_normal(degrees_of_freedom: usize) -> f32 {
-    const FACTORS: [f32; 12] = [
-        6.483, 2.195, 1.624, 1.416, 1.312, 1.248, 1.206, 1.177, 1.154, 1.137, 1.123, 1.112,
-    ];
+    const FACTORS: [f32; 12] =
+        [6.483, 2.195, 1.624, 1.416, 1.312, 1.248, 1.206, 1.177, 1.154, 1.137, 1.123, 1.112];
     match degrees_of_freedom {
         0 => FACTORS[0],
         n => FACTORS.get(n - 1).copied().unwrap_or(1.0 + 1.22 / n as f32),
@@ -92,8 +91,14 @@ mod tests {
             })
             .collect();
         let fit = fit_parabola(&points).unwrap_or_default();
-        assert!((fit.slope - 2.0).abs() < 3.0 * fit.slope_error && fit.slope_error < 0.01, "{fit:?}");
-        assert!((fit.curve - 3.0).abs() < 3.0 * fit.curve_error && fit.curve_error < 0.2, "{fit:?}");
+        assert!(
+            (fit.slope - 2.0).abs() < 3.0 * fit.slope_error && fit.slope_error < 0.01,
+            "{fit:?}"
+        );
+        assert!(
+            (fit.curve - 3.0).abs() < 3.0 * fit.curve_error && fit.curve_error < 0.2,
+            "{fit:?}"
+        );
     }
 
     #[test]

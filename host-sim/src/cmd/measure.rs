@@ -1,12 +1,182 @@
-//! `evtach measure`.
+//! `evtach measure`: speed of every rotor in a recording.
+//!
+//! Exit code 0 when every file has at least one speed, 1 when one has none, 2 for bad usage or input.
 
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+
+use anyhow::{Context, bail};
+use evtach_core::{Event, Geometry, Reading, Roi, Settings};
+use evtach_host::measure::{
+    Capacity, Document, FileFacts, drain, evidence, feed, summarise, table, with_tachometer,
+};
+use evtach_host::recording::{self, OpenOptions};
+use indicatif::{ProgressBar, ProgressStyle};
 
 /// Arguments of `evtach measure`.
 #[derive(clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// Recordings; "-" reads stdin.
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// One JSON document per file instead of a table.
+    #[arg(long)]
+    json: bool,
+    /// Blade count, when it is known.
+    #[arg(long, value_parser = clap::value_parser!(u8).range(1..=64))]
+    blades: Option<u8>,
+    /// Look at this part of the sensor only, in pixels.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse_roi)]
+    roi: Option<Roi>,
+    /// Start this many seconds after the first event.
+    #[arg(long, value_name = "SECONDS")]
+    start: Option<f64>,
+    /// End this many seconds after the first event.
+    #[arg(long, value_name = "SECONDS")]
+    end: Option<f64>,
+    /// Fixed window instead of one that adapts to the rotor.
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(5..=2000))]
+    window_ms: Option<u32>,
+    /// Size of the sensor, where the recording does not say it or says it wrong.
+    #[arg(long, value_name = "WxH", value_parser = recording::parse_geometry)]
+    geometry: Option<Geometry>,
+    /// Memory of the tachometer: "device" gives what the device shows, to the bit.
+    #[arg(long, value_enum, default_value = "full")]
+    capacity: Capacity,
+    /// One standard deviation of the camera clock's error.
+    #[arg(long, value_name = "PPM", default_value_t = 15.0)]
+    clock_ppm: f32,
+    /// Show what each stage found, and why something was refused.
+    #[arg(short, long)]
+    verbose: bool,
+}
+
+fn parse_roi(text: &str) -> Result<Roi, String> {
+    let fields: Vec<u16> = text.split(',').filter_map(|field| field.trim().parse().ok()).collect();
+    match fields[..] {
+        [x, y, width_px, height_px] if width_px > 0 && height_px > 0 => {
+            Ok(Roi { x, y, width_px, height_px })
+        }
+        _ => Err(format!("\"{text}\" is no region; write x,y,width,height in pixels")),
+    }
+}
 
 /// Runs the subcommand.
-pub fn run(_args: Args) -> anyhow::Result<ExitCode> {
-    anyhow::bail!("not there yet")
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let (mut without, mut failed) = (false, false);
+    for file in &args.files {
+        match measure(file, &args) {
+            Ok(read) => without |= !read,
+            Err(error) => {
+                eprintln!("evtach: {error:#}");
+                failed = true;
+            }
+        }
+    }
+    Ok(ExitCode::from(if failed { 2 } else { u8::from(without) }))
+}
+
+/// Measures one file; whether it has a speed.
+fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
+    let name = file.display().to_string();
+    let options = OpenOptions { geometry: args.geometry };
+    let mut recording = recording::open(file, &options).with_context(|| name.clone())?;
+    for assumed in &recording.assumed {
+        eprintln!("{name}: {assumed}");
+    }
+    let mut settings = Settings::new(recording.geometry);
+    settings.roi = args.roi;
+    settings.blades = args.blades;
+    settings.window_us = args.window_ms.map(|ms| ms * 1000);
+    settings.clock_sigma_ppm = args.clock_ppm;
+
+    let bar = ProgressBar::new_spinner();
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {human_pos} events, {per_sec}")
+    {
+        bar.set_style(style);
+    }
+    bar.set_message(name.clone());
+    let mut facts = FileFacts {
+        file: name.clone(),
+        format: recording.format.to_owned(),
+        size_px: (recording.geometry.width_px, recording.geometry.height_px),
+        ..FileFacts::default()
+    };
+    let mut readings: Vec<Reading> = Vec::new();
+    let mut failure = None;
+    let ignored = with_tachometer(settings, args.capacity, |tachometer| {
+        let mut chunk: Vec<Event> = Vec::new();
+        let mut origin_us = None;
+        let (mut known_lost, mut measured) = (0, None::<(u64, u64)>);
+        loop {
+            chunk.clear();
+            let more = recording.read_chunk(&mut chunk).unwrap_or_else(|error| {
+                failure = Some(error);
+                false
+            });
+            facts.events += chunk.len() as u64;
+            bar.inc(chunk.len() as u64);
+            if let Some(first) = chunk.first() {
+                let origin_us = *origin_us.get_or_insert(first.t_us);
+                let at = |seconds: f64| origin_us.saturating_add((seconds * 1e6) as u64);
+                let from_us = args.start.map_or(0, at);
+                let to_us = args.end.map_or(u64::MAX, at);
+                chunk.retain(|event| event.t_us >= from_us && event.t_us < to_us);
+            }
+            tachometer.lost(recording.lost() - known_lost);
+            known_lost = recording.lost();
+            if let (Some(first), Some(last)) = (chunk.first(), chunk.last()) {
+                let start_us = measured.map_or(first.t_us, |(start_us, _)| start_us);
+                measured = Some((start_us, last.t_us));
+            }
+            feed(tachometer, &chunk, &mut &[][..], |reading| readings.push(reading));
+            if !more {
+                break;
+            }
+        }
+        (facts.first_us, facts.last_us) = measured.unwrap_or_default();
+        tachometer.finish();
+        drain(tachometer, |reading| readings.push(reading));
+        facts.thinned = tachometer.thinned();
+        tachometer.ignored()
+    });
+    bar.finish_and_clear();
+    if let Some(error) = failure {
+        if facts.events == 0 {
+            return Err(error).with_context(|| name);
+        }
+        eprintln!("{name}: {error}; measured what came before");
+    }
+    if facts.events == 0 {
+        bail!(
+            "{name}: the recording holds no events; record again, or check the format with `evtach info`"
+        );
+    }
+    if readings.is_empty() && (args.start.is_some() || args.end.is_some() || args.roi.is_some()) {
+        bail!("{name}: no events between --start and --end inside --roi; widen them");
+    }
+    for note in &recording.side().notes {
+        eprintln!("{name}: {note}");
+    }
+    if recording.out_of_bounds() > 0 {
+        eprintln!(
+            "{name}: {} events outside the sensor left out; state its size with --geometry WxH if it is wrong",
+            recording.out_of_bounds()
+        );
+    }
+    if ignored.out_of_order > 0 {
+        eprintln!("{name}: {} events stepped back in time and were left out", ignored.out_of_order);
+    }
+    facts.lost = recording.lost();
+    let middle_us = facts.first_us + (facts.last_us - facts.first_us) / 2;
+    let summary = summarise(&readings, middle_us, args.clock_ppm);
+    if args.json {
+        println!("{}", serde_json::to_string(&Document::new(&facts, &summary, &readings))?);
+    } else {
+        print!("{}", table(&facts, &summary, &readings));
+    }
+    if args.verbose {
+        eprint!("{}", evidence(&readings, facts.first_us));
+    }
+    Ok(summary.rotors.iter().any(|rotor| rotor.speed.is_some()))
 }

@@ -1,0 +1,175 @@
+//! The JSON document of `evtach measure --json`: a contract, its version counted by `schema`.
+
+use evtach_core::{Reading, RotorReading, Status};
+use serde::Serialize;
+
+use super::summary::Summary;
+
+/// One recording.
+#[derive(Clone, Debug, Serialize)]
+pub struct Document {
+    /// Version of the contract.
+    pub schema: u32,
+    /// The file as named by the caller.
+    pub file: String,
+    /// Name of the format.
+    pub format: String,
+    /// Columns of the sensor.
+    pub width_px: u16,
+    /// Rows of the sensor.
+    pub height_px: u16,
+    /// From the first to the last event.
+    pub duration_s: f64,
+    /// Events in the file.
+    pub events: u64,
+    /// Events left out on purpose.
+    pub thinned: u64,
+    /// Events that the sensor or the link lost.
+    pub lost: u64,
+    /// "locked", "coarse" or "refused".
+    pub status: &'static str,
+    /// Why it was refused.
+    pub reason: Option<&'static str>,
+    /// The reading over the whole recording.
+    pub rotors: Vec<RotorRow>,
+    /// The series as the device would show it.
+    pub readings: Vec<ReadingRow>,
+}
+
+/// One rotor of a reading.
+#[derive(Clone, Debug, Serialize)]
+pub struct RotorRow {
+    /// Letter.
+    pub id: String,
+    /// Centre at the middle of the window.
+    pub x_px: f64,
+    /// Centre at the middle of the window.
+    pub y_px: f64,
+    /// Radius of the swept disc.
+    pub radius_px: f64,
+    /// Magnitude of the speed.
+    pub rpm: Option<f64>,
+    /// +/- 1.96 of it covers 95 %.
+    pub rpm_sigma: Option<f64>,
+    /// "cw" or "ccw" as seen on the screen.
+    pub direction: Option<&'static str>,
+    /// Equal blades, where known.
+    pub blades: Option<u8>,
+    /// Change of the magnitude.
+    pub accel_rpm_per_s: Option<f64>,
+    /// "camera" or "room".
+    pub frame: Option<&'static str>,
+    /// "locked", "coarse" or "refused".
+    pub status: &'static str,
+    /// Why it was refused.
+    pub reason: Option<&'static str>,
+}
+
+/// One reading of the series.
+#[derive(Clone, Debug, Serialize)]
+pub struct ReadingRow {
+    /// Middle of the window from the first event.
+    pub t_s: f64,
+    /// Length of the window.
+    pub window_s: f64,
+    /// "locked", "coarse" or "refused".
+    pub status: &'static str,
+    /// Why it was refused.
+    pub reason: Option<&'static str>,
+    /// Its rotors.
+    pub rotors: Vec<RotorRow>,
+}
+
+/// What is known of the file beside the readings.
+#[derive(Clone, Debug, Default)]
+pub struct FileFacts {
+    /// The file as named by the caller.
+    pub file: String,
+    /// Name of the format.
+    pub format: String,
+    /// Columns and rows of the sensor.
+    pub size_px: (u16, u16),
+    /// First event in sensor time.
+    pub first_us: u64,
+    /// Last event in sensor time.
+    pub last_us: u64,
+    /// Events in the file.
+    pub events: u64,
+    /// Events left out on purpose.
+    pub thinned: u64,
+    /// Events lost.
+    pub lost: u64,
+}
+
+fn reason(status: Status) -> Option<&'static str> {
+    status.reason().map(evtach_core::Reason::as_str)
+}
+
+/// Six significant digits more than f32 holds would be noise: as written by f32, read as f64.
+fn widen(value: f32) -> f64 {
+    format!("{value}").parse().unwrap_or(f64::from(value))
+}
+
+impl RotorRow {
+    /// The row of a rotor.
+    #[must_use]
+    pub fn new(rotor: &RotorReading) -> Self {
+        let speed = rotor.speed.as_ref();
+        Self {
+            id: letter(rotor.id),
+            x_px: widen(rotor.x_px),
+            y_px: widen(rotor.y_px),
+            radius_px: widen(rotor.radius_px),
+            rpm: speed.map(|s| widen(s.rpm())),
+            rpm_sigma: speed.map(|s| widen(s.rpm_sigma())),
+            direction: speed.map(|s| s.direction().as_str()),
+            blades: rotor.blades,
+            accel_rpm_per_s: speed.and_then(|s| s.accel_rpm_per_s()).map(widen),
+            frame: speed.map(|s| s.frame.as_str()),
+            status: rotor.status.as_str(),
+            reason: reason(rotor.status),
+        }
+    }
+}
+
+impl ReadingRow {
+    /// The row of a reading; `first_us` is the first event in sensor time.
+    #[must_use]
+    pub fn new(reading: &Reading, first_us: u64) -> Self {
+        Self {
+            t_s: reading.t_us.saturating_sub(first_us) as f64 * 1e-6,
+            window_s: f64::from(reading.window_us) * 1e-6,
+            status: reading.status.as_str(),
+            reason: reason(reading.status),
+            rotors: reading.rotors.iter().map(RotorRow::new).collect(),
+        }
+    }
+}
+
+impl Document {
+    /// The document of a recording.
+    #[must_use]
+    pub fn new(facts: &FileFacts, summary: &Summary, readings: &[Reading]) -> Self {
+        Self {
+            schema: 1,
+            file: facts.file.clone(),
+            format: facts.format.clone(),
+            width_px: facts.size_px.0,
+            height_px: facts.size_px.1,
+            duration_s: facts.last_us.saturating_sub(facts.first_us) as f64 * 1e-6,
+            events: facts.events,
+            thinned: facts.thinned,
+            lost: facts.lost,
+            status: summary.status.as_str(),
+            reason: reason(summary.status),
+            rotors: summary.rotors.iter().map(RotorRow::new).collect(),
+            readings: readings.iter().map(|r| ReadingRow::new(r, facts.first_us)).collect(),
+        }
+    }
+}
+
+/// The letter of a rotor: A, B, ... Z, then numbers.
+#[must_use]
+pub fn letter(id: u8) -> String {
+    if id < 26 { char::from(b'A' + id).to_string() } else { format!("R{id}") }
+}

@@ -1,0 +1,110 @@
+//! From a recording to readings: the device's own tachometer over a file.
+
+mod json;
+mod summary;
+mod table;
+
+use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
+use evtach_core::tachometer::Ignored;
+use evtach_core::{Event, GyroSample, Memory, Poll, Reading, Settings, StoredEvent, Tachometer};
+
+pub use json::{Document, FileFacts, ReadingRow, RotorRow, letter};
+pub use summary::{Summary, summarise};
+pub use table::{evidence, table};
+
+/// How much memory the tachometer is lent: the only difference between device and PC.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Capacity {
+    /// What the handheld device has.
+    Device,
+    /// Sixteen times as much.
+    Full,
+}
+
+impl Capacity {
+    /// Events in the store.
+    #[must_use]
+    pub const fn events(self) -> usize {
+        match self {
+            Self::Device => DEVICE_EVENTS,
+            Self::Full => 16 * DEVICE_EVENTS,
+        }
+    }
+
+    /// Cells of the heat map.
+    #[must_use]
+    pub const fn heat_cells(self) -> usize {
+        match self {
+            Self::Device => DEVICE_HEAT_CELLS,
+            Self::Full => 4 * DEVICE_HEAT_CELLS,
+        }
+    }
+}
+
+/// Runs `work` with a tachometer of this capacity.
+pub fn with_tachometer<R>(
+    settings: Settings,
+    capacity: Capacity,
+    work: impl FnOnce(&mut Tachometer<'_>) -> R,
+) -> R {
+    let mut events = vec![StoredEvent::default(); capacity.events()];
+    let mut heat = vec![0_u16; capacity.heat_cells()];
+    let mut weights = vec![0_u8; capacity.heat_cells()];
+    let memory = Memory { events: &mut events, heat: &mut heat, weights: &mut weights };
+    work(&mut Tachometer::new(settings, memory))
+}
+
+/// Largest piece handed to the tachometer before it is polled: far less than two segments hold.
+const PIECE_EVENTS: usize = 256;
+
+/// Pushes events and gyro samples in time order and measures every window as soon as it is full.
+///
+/// `samples` is used up as far as the events reach.
+pub fn feed(
+    tachometer: &mut Tachometer<'_>,
+    events: &[Event],
+    samples: &mut &[GyroSample],
+    mut reading: impl FnMut(Reading),
+) {
+    for piece in events.chunks(PIECE_EVENTS) {
+        let Some(first) = piece.first() else { continue };
+        while let Some((sample, rest)) = samples.split_first() {
+            if sample.t_us > first.t_us {
+                break;
+            }
+            tachometer.gyro(*sample);
+            *samples = rest;
+        }
+        tachometer.push(piece);
+        drain(tachometer, &mut reading);
+    }
+}
+
+/// Measures what is due.
+pub fn drain(tachometer: &mut Tachometer<'_>, mut reading: impl FnMut(Reading)) {
+    loop {
+        match tachometer.poll(u32::MAX) {
+            Poll::Ready(found) => reading(found),
+            Poll::Pending => {}
+            Poll::Idle => return,
+        }
+    }
+}
+
+/// A whole recording in memory, measured.
+#[must_use]
+pub fn measure_events(
+    events: &[Event],
+    samples: &[GyroSample],
+    settings: Settings,
+    capacity: Capacity,
+) -> (Vec<Reading>, Ignored) {
+    with_tachometer(settings, capacity, |tachometer| {
+        let mut readings = Vec::new();
+        let mut samples = samples;
+        feed(tachometer, events, &mut samples, |reading| readings.push(reading));
+        tachometer.finish();
+        drain(tachometer, |reading| readings.push(reading));
+        (readings, tachometer.ignored())
+    })
+}

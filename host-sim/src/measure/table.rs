@@ -1,0 +1,117 @@
+//! The table of `evtach measure` for people.
+
+use std::fmt::Write as _;
+
+use evtach_core::{Reading, RotorReading, Speed, Status};
+
+use super::json::{FileFacts, letter};
+use super::summary::Summary;
+
+/// Formats the result of one recording.
+#[must_use]
+pub fn table(facts: &FileFacts, summary: &Summary, readings: &[Reading]) -> String {
+    let mut text = String::new();
+    let seconds = facts.last_us.saturating_sub(facts.first_us) as f64 * 1e-6;
+    let (width, height) = facts.size_px;
+    let _ = writeln!(
+        text,
+        "{}: {} {width}x{height}, {seconds:.3} s, {} events ({} thinned, {} lost), {} readings",
+        facts.file,
+        facts.format,
+        facts.events,
+        facts.thinned,
+        facts.lost,
+        readings.len()
+    );
+    for rotor in &summary.rotors {
+        let _ = writeln!(text, "  {}", row(rotor));
+    }
+    if let Status::Refused(reason) = summary.status {
+        let _ = writeln!(text, "  no reading: {} ({})", reason.as_str(), reason.advice());
+    }
+    text
+}
+
+/// One rotor in one line.
+fn row(rotor: &RotorReading) -> String {
+    let place = format!("at ({:.0}, {:.0}) r {:.0} px", rotor.x_px, rotor.y_px, rotor.radius_px);
+    let Some(speed) = &rotor.speed else {
+        let reason = rotor.status.reason().map_or("", evtach_core::Reason::as_str);
+        return format!("{}  ----- rpm  {reason}  {place}", letter(rotor.id));
+    };
+    let blades = match rotor.blades {
+        Some(1) => "1 mark or blade".to_owned(),
+        Some(n) => format!("{n} blades"),
+        None => "blades unknown".to_owned(),
+    };
+    let mut line = format!(
+        "{}  {} rpm {}  {blades}  {}  {place}",
+        letter(rotor.id),
+        with_error(speed),
+        speed.direction().as_str(),
+        rotor.status.as_str()
+    );
+    if let Some(acceleration) = speed.accel_rpm_per_s() {
+        let _ = write!(line, "  {acceleration:+.1} rpm/s");
+    }
+    line
+}
+
+/// Speed and error bar with as many digits as the error supports: its first two.
+fn with_error(speed: &Speed) -> String {
+    let sigma = f64::from(speed.rpm_sigma());
+    let digits = (1.0 - sigma.max(1e-6).log10().floor()).clamp(0.0, 4.0) as usize;
+    format!("{:.digits$} ± {:.digits$}", speed.rpm(), sigma)
+}
+
+/// What each stage found, for `-v`.
+#[must_use]
+pub fn evidence(readings: &[Reading], first_us: u64) -> String {
+    let mut text = String::new();
+    let rpm = |value: Option<f32>| {
+        value.map_or_else(|| "-".to_owned(), |v| format!("{:.2}", v * Speed::RPM_PER_RAD_S))
+    };
+    let plain = |value: Option<f32>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+    for reading in readings {
+        let _ = writeln!(
+            text,
+            "  t {:.3} s, window {:.0} ms, {} events: {}{}",
+            reading.t_us.saturating_sub(first_us) as f64 * 1e-6,
+            f64::from(reading.window_us) * 1e-3,
+            reading.events,
+            reading.status.as_str(),
+            reading.status.reason().map_or_else(String::new, |r| format!(" ({})", r.as_str()))
+        );
+        for rotor in &reading.rotors {
+            let e = &rotor.evidence;
+            let _ = writeln!(text, "    {}", row(rotor));
+            let _ = writeln!(
+                text,
+                "      events {}  in step {}  scan {} rpm, score {}, standing {}  symmetry {}  periods {}",
+                e.events,
+                plain(e.coherence),
+                rpm(e.scan_rad_s),
+                plain(e.scan_score),
+                plain(e.scan_standing),
+                plain(e.symmetry_score),
+                plain(e.periods)
+            );
+            let _ = writeln!(
+                text,
+                "      initial {}  free axis {} ± {}  refined {} ± {}  further {}  lock {} ± {}  phase {} ± {}  fractional {}",
+                rpm(e.initial_rad_s),
+                rpm(e.free_axis_rad_s),
+                rpm(e.free_axis_sigma_rad_s),
+                rpm(e.refined_rad_s),
+                rpm(e.refined_sigma_rad_s),
+                rpm(e.further_rad_s),
+                rpm(e.lock_rad_s),
+                rpm(e.lock_sigma_rad_s),
+                rpm(e.phase_rad_s),
+                rpm(e.phase_sigma_rad_s),
+                plain(e.fractional_deviation)
+            );
+        }
+    }
+    text
+}
