@@ -1,1 +1,184 @@
 //! Event recordings: one folder a format, found by looking inside.
+
+mod aedat4;
+mod csv;
+mod dat;
+mod error;
+mod geometry;
+mod input;
+mod open;
+mod prophesee_header;
+mod raw;
+pub mod write;
+
+use evtach_core::{Event, Geometry};
+
+pub use error::{Place, RecordingError};
+pub use open::open;
+
+/// Parses a sensor size such as "640x480".
+///
+/// # Errors
+/// When it is no size, or a side is 0 or longer than [`Geometry::MAX_PX`].
+pub fn parse_geometry(text: &str) -> Result<Geometry, String> {
+    geometry::parse(text).ok_or_else(|| {
+        format!(
+            "\"{text}\" is no sensor size; write for example 640x480, each side 1 to {}",
+            Geometry::MAX_PX
+        )
+    })
+}
+
+/// What the person knows about a recording that the file may not say.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct OpenOptions {
+    /// Size of the sensor; overrides what the file says.
+    pub geometry: Option<Geometry>,
+}
+
+/// What a format's reader knows after its header.
+pub(crate) struct Opened {
+    pub format: &'static str,
+    pub geometry: Option<Geometry>,
+    pub assumed: Vec<String>,
+    pub about: Vec<(String, String)>,
+    pub source: Box<dyn Source>,
+}
+
+/// The events of one format, piece by piece.
+pub(crate) trait Source: Send {
+    /// Appends some events; `false` at the end. On an error, what was appended before it is good.
+    fn read(&mut self, events: &mut Vec<Event>, side: &mut Side) -> Result<bool, RecordingError>;
+}
+
+/// What a recording tells beside its events.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Side {
+    /// Events that the sensor or the link reported lost.
+    pub lost: u64,
+    /// Times the format's clock wrapped.
+    pub wraps: u64,
+    /// Events dropped because the stream had not told the time yet.
+    pub untimed: u64,
+    /// What a person should know, one sentence each: cut files, skipped streams.
+    pub notes: Vec<String>,
+}
+
+/// An open recording.
+pub struct Recording {
+    /// Name of the format, for example "EVT3".
+    pub format: &'static str,
+    /// Size of the sensor in pixels.
+    pub geometry: Geometry,
+    /// What was assumed, one sentence each.
+    pub assumed: Vec<String>,
+    /// What the header tells: sensor, serial number, software.
+    pub about: Vec<(String, String)>,
+    source: Box<dyn Source>,
+    side: Side,
+    out_of_order: u64,
+    out_of_bounds: u64,
+    last_us: u64,
+    ended: bool,
+    pending: Option<RecordingError>,
+}
+
+impl Recording {
+    /// Events kept from growing without bound when a reader hands out little at a time.
+    const CHUNK_EVENTS: usize = 16_384;
+
+    fn new(opened: Opened, geometry: Geometry) -> Self {
+        Self {
+            format: opened.format,
+            geometry,
+            assumed: opened.assumed,
+            about: opened.about,
+            source: opened.source,
+            side: Side::default(),
+            out_of_order: 0,
+            out_of_bounds: 0,
+            last_us: 0,
+            ended: false,
+            pending: None,
+        }
+    }
+
+    /// Appends the next events (some ten thousand) and tells whether there may be more.
+    ///
+    /// Events outside the sensor are counted and left out; events that step back in time are counted and kept.
+    ///
+    /// # Errors
+    /// When the recording is damaged or cannot be read on. The events before the damage have then been delivered by
+    /// the calls before.
+    pub fn read_chunk(&mut self, events: &mut Vec<Event>) -> Result<bool, RecordingError> {
+        if let Some(error) = self.pending.take() {
+            self.ended = true;
+            return Err(error);
+        }
+        let first = events.len();
+        while !self.ended && events.len() - first < Self::CHUNK_EVENTS {
+            let before = events.len();
+            match self.source.read(events, &mut self.side) {
+                Ok(more) => self.ended = !more,
+                Err(error) => {
+                    self.check(events, before);
+                    if events.len() == first {
+                        self.ended = true;
+                        return Err(error);
+                    }
+                    self.pending = Some(error);
+                    return Ok(true);
+                }
+            }
+            self.check(events, before);
+        }
+        Ok(!self.ended)
+    }
+
+    /// Drops and counts what lies outside the sensor, counts steps back in time.
+    fn check(&mut self, events: &mut Vec<Event>, first: usize) {
+        let geometry = self.geometry;
+        let mut outside = false;
+        for event in &events[first..] {
+            outside |= !geometry.contains(event.x, event.y);
+        }
+        if outside {
+            let before = events.len();
+            let mut index = 0;
+            events.retain(|event| {
+                let keep = index < first || geometry.contains(event.x, event.y);
+                index += 1;
+                keep
+            });
+            self.out_of_bounds += (before - events.len()) as u64;
+        }
+        for event in &events[first..] {
+            self.out_of_order += u64::from(event.t_us < self.last_us);
+            self.last_us = event.t_us;
+        }
+    }
+
+    /// Events so far that stepped back in time relative to the one before.
+    #[must_use]
+    pub const fn out_of_order(&self) -> u64 {
+        self.out_of_order
+    }
+
+    /// Events so far that lay outside the sensor and were left out.
+    #[must_use]
+    pub const fn out_of_bounds(&self) -> u64 {
+        self.out_of_bounds
+    }
+
+    /// What the recording told beside its events so far: losses, wraps, notes.
+    #[must_use]
+    pub const fn side(&self) -> &Side {
+        &self.side
+    }
+
+    /// Events so far that the sensor or the link reported lost.
+    #[must_use]
+    pub const fn lost(&self) -> u64 {
+        self.side.lost
+    }
+}

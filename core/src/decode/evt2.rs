@@ -1,0 +1,133 @@
+//! Prophesee EVT 2.0: one event in a 32-bit word.
+
+use super::polarity;
+use crate::event::Event;
+
+/// Bits of the TIME_HIGH counter, which counts steps of 64 us: it wraps after 2^34 us (4.8 hours).
+const HIGH_BITS: u32 = 28;
+const LOW_BITS: u32 = 6;
+
+/// Decoder of EVT 2.0 words (Prophesee, "EVT 2.0 format").
+#[derive(Clone, Debug, Default)]
+pub struct Evt2 {
+    /// Time of the last TIME_HIGH word in microseconds, wraps included.
+    base_us: u64,
+    /// Payload of the last TIME_HIGH word.
+    high: Option<u32>,
+    wraps: u32,
+    untimed: u64,
+    unknown: u64,
+}
+
+impl Evt2 {
+    /// A decoder at the start of a stream.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { base_us: 0, high: None, wraps: 0, untimed: 0, unknown: 0 }
+    }
+
+    /// Takes in one word and hands out the event in it, if any.
+    #[inline]
+    pub fn decode(&mut self, word: u32, mut emit: impl FnMut(Event)) {
+        let kind = word >> HIGH_BITS;
+        match kind {
+            0x0 | 0x1 => {
+                if self.high.is_none() {
+                    self.untimed += 1;
+                    return;
+                }
+                emit(Event {
+                    t_us: self.base_us | u64::from((word >> 22) & 0x3f),
+                    x: ((word >> 11) & 0x7ff) as u16,
+                    y: (word & 0x7ff) as u16,
+                    polarity: polarity(kind == 1),
+                });
+            }
+            0x8 => self.time_high(word & 0x0fff_ffff),
+            // Triggers and the vendor's own words carry no pixel.
+            0xa | 0xe | 0xf => {}
+            _ => self.unknown += 1,
+        }
+    }
+
+    fn time_high(&mut self, high: u32) {
+        // Only a jump back by more than half the range is the counter's wrap; less is a stream out of order.
+        if self.high.is_some_and(|before| before > high && before - high > 1 << (HIGH_BITS - 1)) {
+            self.wraps += 1;
+        }
+        self.high = Some(high);
+        self.base_us =
+            (u64::from(self.wraps) << (HIGH_BITS + LOW_BITS)) | (u64::from(high) << LOW_BITS);
+    }
+
+    /// Times the wire's clock wrapped.
+    #[must_use]
+    pub const fn wraps(&self) -> u32 {
+        self.wraps
+    }
+
+    /// Events dropped because no time word had come yet.
+    #[must_use]
+    pub const fn untimed(&self) -> u64 {
+        self.untimed
+    }
+
+    /// Words of a type the format does not define: many of them mean that this is not EVT 2.0.
+    #[must_use]
+    pub const fn unknown(&self) -> u64 {
+        self.unknown
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::event::Polarity;
+
+    extern crate std;
+    use std::vec::Vec;
+
+    fn decode(words: &[u32]) -> (Vec<Event>, Evt2) {
+        let mut decoder = Evt2::new();
+        let mut events = Vec::new();
+        for &word in words {
+            decoder.decode(word, |event| events.push(event));
+        }
+        (events, decoder)
+    }
+
+    fn cd(on: u32, low: u32, x: u32, y: u32) -> u32 {
+        on << 28 | low << 22 | x << 11 | y
+    }
+
+    #[test]
+    fn fields_are_where_the_format_puts_them() {
+        let (events, decoder) =
+            decode(&[cd(1, 5, 7, 9), 8 << 28 | 3, cd(1, 5, 2047, 9), cd(0, 6, 7, 2047)]);
+        assert_eq!(
+            events,
+            [
+                Event { t_us: 3 * 64 + 5, x: 2047, y: 9, polarity: Polarity::On },
+                Event { t_us: 3 * 64 + 6, x: 7, y: 2047, polarity: Polarity::Off },
+            ]
+        );
+        assert_eq!(decoder.untimed(), 1);
+    }
+
+    #[test]
+    fn clock_wraps_after_2_to_the_34() {
+        let last = (1 << 28) - 1;
+        let (events, decoder) = decode(&[8 << 28 | last, cd(0, 63, 1, 1), 8 << 28, cd(0, 0, 1, 1)]);
+        assert_eq!(events[0].t_us, (1 << 34) - 1);
+        assert_eq!(events[1].t_us, 1 << 34);
+        assert_eq!(decoder.wraps(), 1);
+    }
+
+    #[test]
+    fn small_step_back_is_no_wrap() {
+        let (events, decoder) =
+            decode(&[8 << 28 | 100, cd(0, 0, 1, 1), 8 << 28 | 99, cd(0, 0, 1, 1)]);
+        assert_eq!(events[1].t_us, 99 * 64);
+        assert_eq!(decoder.wraps(), 0);
+    }
+}

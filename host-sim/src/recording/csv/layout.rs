@@ -1,0 +1,272 @@
+//! Which column is what, found from a header line or from the first rows.
+
+use evtach_core::Geometry;
+
+use crate::recording::error::{Place, RecordingError};
+use crate::recording::geometry;
+
+/// Unit of the time column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unit {
+    Seconds,
+    Milliseconds,
+    Microseconds,
+    Nanoseconds,
+}
+
+impl Unit {
+    /// Power of ten from this unit to microseconds.
+    pub const fn exponent(self) -> i32 {
+        match self {
+            Self::Seconds => 6,
+            Self::Milliseconds => 3,
+            Self::Microseconds => 0,
+            Self::Nanoseconds => -3,
+        }
+    }
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Seconds => "seconds",
+            Self::Milliseconds => "milliseconds",
+            Self::Microseconds => "microseconds",
+            Self::Nanoseconds => "nanoseconds",
+        }
+    }
+}
+
+/// Layout of a text recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layout {
+    /// Columns of t, x, y and polarity, counted from 0.
+    pub columns: [usize; 4],
+    pub unit: Unit,
+    pub geometry: Option<Geometry>,
+    /// Lines before the first event.
+    pub skip_lines: u64,
+    /// One sentence each on how this was found.
+    pub assumed: Vec<String>,
+}
+
+/// Fields of a line: commas, semicolons, tabs and runs of blanks all separate.
+pub fn fields(line: &str) -> impl Iterator<Item = &str> {
+    line.split([',', ';', '\t', ' ', '\r']).filter(|field| !field.is_empty())
+}
+
+/// Finds the layout from the first lines of a file.
+pub fn find(head: &str) -> Result<Layout, RecordingError> {
+    let mut names: Option<Vec<(usize, Option<Unit>)>> = None;
+    let mut layout = Layout {
+        columns: [0, 1, 2, 3],
+        unit: Unit::Microseconds,
+        geometry: None,
+        skip_lines: 0,
+        assumed: Vec::new(),
+    };
+    let mut rows: Vec<Vec<&str>> = Vec::new();
+    let mut vendor_order = false;
+    for line in head.lines() {
+        let line = line.trim_start_matches('\u{feff}').trim();
+        let numeric = fields(line).next().is_some_and(|field| field.parse::<f64>().is_ok());
+        if rows.is_empty() && !numeric {
+            layout.skip_lines += 1;
+            let bare = line.trim_start_matches(['#', '%']).trim();
+            if let Some(value) = bare.strip_prefix("geometry:") {
+                layout.geometry = geometry::parse(value.trim());
+                vendor_order = true;
+            } else if let Some(found) = columns_from_names(bare) {
+                names = Some(found);
+            } else if !line.is_empty() && !line.starts_with(['#', '%']) {
+                return Err(not_events(layout.skip_lines, line));
+            }
+            continue;
+        }
+        let row: Vec<&str> = fields(line).collect();
+        if rows.is_empty() && row.len() == 2 && layout.skip_lines == 0 {
+            layout.skip_lines += 1;
+            layout.geometry = geometry::parse(&format!("{},{}", row[0], row[1]));
+            continue;
+        }
+        if row.len() < 4 {
+            // The last line of the look-ahead may be cut.
+            break;
+        }
+        rows.push(row);
+        if rows.len() == 256 {
+            break;
+        }
+    }
+    if rows.is_empty() {
+        return Err(not_events(layout.skip_lines + 1, head.lines().next().unwrap_or_default()));
+    }
+    if let Some(geometry) = layout.geometry {
+        layout.assumed.push(format!("{} from the first line", geometry::show(geometry)));
+    }
+    let mut told_unit = None;
+    if let Some(names) = names {
+        for (column, found) in layout.columns.iter_mut().zip(&names) {
+            *column = found.0;
+        }
+        told_unit = names[0].1;
+    } else {
+        layout.columns = if vendor_order { [3, 0, 1, 2] } else { columns_from_rows(&rows) };
+        let order = order(layout.columns);
+        layout.assumed.push(format!(
+            "columns {order}{}",
+            if vendor_order { " (as %geometry files have them)" } else { " from the first rows" }
+        ));
+    }
+    layout.unit = told_unit.unwrap_or_else(|| unit_from_rows(&rows, layout.columns[0]));
+    let how = if told_unit.is_some() { "as its column says" } else { "from the first rows" };
+    layout.assumed.push(format!("time in {}, {how}", layout.unit.name()));
+    Ok(layout)
+}
+
+fn not_events(line: u64, text: &str) -> RecordingError {
+    let shown: String = text.chars().take(40).collect();
+    RecordingError::Unknown {
+        found: format!("text whose {} is \"{shown}\"", Place::Line(line)),
+        advice: "a text recording has one event a line, t,x,y,p, with or without a line of column names",
+    }
+}
+
+fn order(columns: [usize; 4]) -> String {
+    let mut named: Vec<(usize, &str)> = columns.into_iter().zip(["t", "x", "y", "p"]).collect();
+    named.sort_unstable();
+    named.iter().map(|(_, name)| *name).collect::<Vec<_>>().join(",")
+}
+
+/// Columns t, x, y, p with the unit their name tells, or `None` when the line does not name all four.
+fn columns_from_names(line: &str) -> Option<Vec<(usize, Option<Unit>)>> {
+    let names: Vec<String> = line
+        .split([',', ';', '\t'])
+        .flat_map(|part| {
+            if line.contains([',', ';', '\t']) { vec![part] } else { part.split(' ').collect() }
+        })
+        .map(|name| name.trim().trim_matches(['"', '\'']).to_ascii_lowercase())
+        .filter(|name| !name.is_empty())
+        .collect();
+    // "timestamp [us]" and "t_us" tell their unit behind the name.
+    let split = |name: &str| -> (String, Option<Unit>) {
+        let (stem, suffix) = name.split_once(['_', '[', '(', ' ']).unwrap_or((name, ""));
+        let unit = match suffix.trim_matches(|c: char| !c.is_ascii_alphabetic()) {
+            "s" | "sec" | "seconds" => Some(Unit::Seconds),
+            "ms" | "milliseconds" => Some(Unit::Milliseconds),
+            "us" | "micros" | "microseconds" => Some(Unit::Microseconds),
+            "ns" | "nanoseconds" => Some(Unit::Nanoseconds),
+            _ => None,
+        };
+        (stem.trim().to_owned(), unit)
+    };
+    [
+        &["t", "time", "timestamp", "timestamps", "ts"][..],
+        &["x", "col", "column"],
+        &["y", "row"],
+        &["p", "pol", "polarity", "polarities", "on"],
+    ]
+    .into_iter()
+    .map(|wanted| {
+        names.iter().enumerate().find_map(|(column, name)| {
+            let (stem, unit) = split(name);
+            wanted.contains(&stem.as_str()).then_some((column, unit))
+        })
+    })
+    .collect()
+}
+
+/// Columns t, x, y, p by what the numbers look like.
+fn columns_from_rows(rows: &[Vec<&str>]) -> [usize; 4] {
+    let value = |row: &Vec<&str>, column: usize| {
+        row.get(column).and_then(|field| field.parse::<f64>().ok()).unwrap_or(f64::NAN)
+    };
+    let is_polarity = |column: usize| {
+        rows.iter()
+            .all(|row| row.get(column).is_some_and(|field| super::read::polarity(field).is_some()))
+    };
+    // Last, then third: the places in use.
+    let p = [3, 2, 0, 1].into_iter().find(|&column| is_polarity(column)).unwrap_or(3);
+    let rises = |column: usize| {
+        rows.windows(2).all(|pair| value(&pair[0], column) <= value(&pair[1], column))
+    };
+    let largest = |column: usize| rows.iter().map(|row| value(row, column)).fold(0.0, f64::max);
+    let fractional = |column: usize| rows.iter().any(|row| value(row, column).fract() != 0.0);
+    let mut others: Vec<usize> = (0..4).filter(|&column| column != p).collect();
+    // Time has a fraction, or else never falls, or else is the largest number.
+    let t = others
+        .iter()
+        .copied()
+        .max_by(|&a, &b| {
+            let key = |column| (fractional(column), rises(column));
+            key(a).cmp(&key(b)).then(largest(a).total_cmp(&largest(b))).then(b.cmp(&a))
+        })
+        .unwrap_or(0);
+    others.retain(|&column| column != t);
+    [t, others[0], others[1], p]
+}
+
+/// Seconds are told by fractions finer than a millisecond between events closer than one second.
+fn unit_from_rows(rows: &[Vec<&str>], column: usize) -> Unit {
+    let values: Vec<f64> = rows.iter().filter_map(|row| row.get(column)?.parse().ok()).collect();
+    let fractional = values.iter().any(|t| (t * 1e3).fract() != 0.0 && t.fract() != 0.0);
+    let step = match (values.first(), values.last()) {
+        (Some(first), Some(last)) => (last - first).abs() / values.len() as f64,
+        _ => 0.0,
+    };
+    if fractional && step < 1.0 { Unit::Seconds } else { Unit::Microseconds }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test")]
+mod tests {
+    use super::*;
+
+    fn columns(head: &str) -> ([usize; 4], Unit) {
+        let layout = find(head).unwrap();
+        (layout.columns, layout.unit)
+    }
+
+    #[test]
+    fn header_names_map_the_columns() {
+        assert_eq!(
+            columns("x,y,polarity,timestamp\n1,2,0,5\n"),
+            ([3, 0, 1, 2], Unit::Microseconds)
+        );
+        assert_eq!(columns("t,x,y,on\n5,1,2,1\n"), ([0, 1, 2, 3], Unit::Microseconds));
+        assert_eq!(
+            columns("# timestamp [ns], x, y, p\n5000,1,2,1\n"),
+            ([0, 1, 2, 3], Unit::Nanoseconds)
+        );
+        assert_eq!(columns("t_s x y p\n0.5 1 2 1\n"), ([0, 1, 2, 3], Unit::Seconds));
+    }
+
+    #[test]
+    fn first_rows_show_the_order() {
+        assert_eq!(columns("10,5,6,1\n12,3,4,0\n"), ([0, 1, 2, 3], Unit::Microseconds));
+        assert_eq!(
+            columns("5,6,1,1000\n3,4,0,1001\n9,1,0,1002\n"),
+            ([3, 0, 1, 2], Unit::Microseconds)
+        );
+        assert_eq!(columns("5,6,1000,1\n3,4,1001,-1\n"), ([2, 0, 1, 3], Unit::Microseconds));
+        assert_eq!(columns("0.003811 96 133 0\n0.003820 11 22 1\n"), ([0, 1, 2, 3], Unit::Seconds));
+    }
+
+    #[test]
+    fn rpg_size_line_and_vendor_geometry_line() {
+        let layout = find("240 180\n0.003811 96 133 0\n0.003820 11 22 1\n").unwrap();
+        assert_eq!((layout.geometry, layout.unit), (Geometry::new(240, 180), Unit::Seconds));
+        let layout = find("%geometry:640,480\n0,0,1,7\n1,0,1,8\n").unwrap();
+        assert_eq!((layout.geometry, layout.columns), (Geometry::new(640, 480), [3, 0, 1, 2]));
+    }
+
+    #[test]
+    fn prose_is_refused() {
+        assert!(find("Dear reader,\nthis is a letter\n").is_err());
+        assert!(find("1\n2\n3\n").is_err());
+    }
+
+    #[test]
+    fn floats_that_are_whole_are_microseconds() {
+        let head = "1.304e+06 1.0e+00 2.0e+00 1.0e+00\n1.305e+06 3.0e+00 2.0e+00 0.0e+00\n";
+        assert_eq!(columns(head), ([0, 1, 2, 3], Unit::Microseconds));
+    }
+}

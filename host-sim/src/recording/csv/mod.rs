@@ -1,0 +1,8 @@
+//! Text: one event a line, separated by commas, semicolons, tabs or blanks.
+
+mod layout;
+mod read;
+mod write;
+
+pub(crate) use read::{is_text, open};
+pub(crate) use write::CsvWriter;

@@ -1,0 +1,102 @@
+//! What can be wrong with a recording, with the place in it and what to do about it.
+
+use std::fmt;
+use std::io;
+
+/// Where in a recording something is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// Offset in bytes from the start of the (uncompressed) recording.
+    Byte(u64),
+    /// Line of a text file, counted from 1.
+    Line(u64),
+    /// Record or message, counted from 0.
+    Record(u64),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Byte(offset) => write!(f, "byte {offset}"),
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Record(record) => write!(f, "record {record}"),
+        }
+    }
+}
+
+/// Why a recording cannot be read or written; each message ends with what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingError {
+    /// The file cannot be opened or created.
+    #[error("cannot open {path}: {source}\nhelp: check the path and its permissions")]
+    Open {
+        /// The path as given.
+        path: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Reading failed below the format.
+    #[error(
+        "cannot read on at byte {offset}: {source}\nhelp: check the disk or the pipe; a compressed file may be cut short"
+    )]
+    Read {
+        /// Bytes read so far.
+        offset: u64,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Writing failed below the format.
+    #[error(
+        "cannot write: {0}\nhelp: check that the disk has room and that the reader of a pipe still runs"
+    )]
+    Write(#[source] io::Error),
+    /// There is nothing in the file.
+    #[error("the file is empty\nhelp: record again, or check that the copy finished")]
+    Empty,
+    /// The content is no known format.
+    #[error("not a recording that is known here: {found}\nhelp: {advice}")]
+    Unknown {
+        /// What the content looks like.
+        found: String,
+        /// What to do.
+        advice: &'static str,
+    },
+    /// The format is known but this kind of it is not read.
+    #[error("{what}\nhelp: {advice}")]
+    Unsupported {
+        /// What is not supported.
+        what: String,
+        /// What to do.
+        advice: String,
+    },
+    /// The format does not say the sensor's size and it could not be inferred.
+    #[error(
+        "{format} does not say the size of the sensor\nhelp: give it with --geometry WxH, for example --geometry 640x480"
+    )]
+    NoGeometry {
+        /// Name of the format.
+        format: &'static str,
+    },
+    /// The content contradicts its format.
+    #[error(
+        "{format}, {place}: {what}\nhelp: what came before is good; cut the file there with `evtach convert --end`, or record again"
+    )]
+    Damaged {
+        /// Name of the format.
+        format: &'static str,
+        /// Where.
+        place: Place,
+        /// What is wrong there.
+        what: String,
+    },
+    /// An event does not fit into the format that is to be written.
+    #[error("{format} cannot hold {what}\nhelp: {advice}")]
+    DoesNotFit {
+        /// Name of the format.
+        format: &'static str,
+        /// What does not fit.
+        what: String,
+        /// What to do.
+        advice: &'static str,
+    },
+}

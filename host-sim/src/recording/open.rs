@@ -1,0 +1,122 @@
+//! Finds out what a file is by looking inside, and opens it.
+
+use std::fs::File;
+use std::path::Path;
+
+use evtach_core::Event;
+use flate2::read::MultiGzDecoder;
+
+use super::error::RecordingError;
+use super::input::Input;
+use super::prophesee_header::Header;
+use super::{OpenOptions, Opened, Recording, Side, aedat4, csv, dat, geometry, raw};
+
+/// Bytes looked at to tell text from binary.
+const SNIFF_BYTES: usize = 4096;
+
+/// Opens a recording; "-" reads stdin.
+///
+/// # Errors
+/// When the file cannot be read, is no known recording, or its sensor size is neither told nor inferable.
+pub fn open(path: &Path, options: &OpenOptions) -> Result<Recording, RecordingError> {
+    let mut opened = sniff(input(path)?, true)?;
+    let geometry = if let Some(geometry) = options.geometry {
+        opened.assumed = vec![format!("{} as given by --geometry", geometry::show(geometry))];
+        geometry
+    } else if let Some(geometry) = opened.geometry {
+        geometry
+    } else {
+        if path.as_os_str() == "-" {
+            return Err(RecordingError::NoGeometry { format: opened.format });
+        }
+        let (geometry, sentence) = scan(&mut opened)?;
+        opened = sniff(input(path)?, true)?;
+        opened.assumed.push(sentence);
+        geometry
+    };
+    Ok(Recording::new(opened, geometry))
+}
+
+fn input(path: &Path) -> Result<Input, RecordingError> {
+    if path.as_os_str() == "-" {
+        return Ok(Input::new(Box::new(std::io::stdin())));
+    }
+    let file = File::open(path)
+        .map_err(|source| RecordingError::Open { path: path.display().to_string(), source })?;
+    Ok(Input::new(Box::new(file)))
+}
+
+/// Reads through a recording to see where its events lie.
+fn scan(opened: &mut Opened) -> Result<(evtach_core::Geometry, String), RecordingError> {
+    let mut events: Vec<Event> = Vec::new();
+    let (mut x_max, mut y_max) = (0, 0);
+    let mut any = false;
+    loop {
+        events.clear();
+        // What damage there is will be told when the recording is read for good.
+        let more = opened.source.read(&mut events, &mut Side::default()).unwrap_or(false);
+        for event in &events {
+            any = true;
+            x_max = x_max.max(event.x);
+            y_max = y_max.max(event.y);
+        }
+        if !more {
+            break;
+        }
+    }
+    let found = any
+        .then(|| geometry::of_extent(x_max.saturating_add(1), y_max.saturating_add(1)))
+        .flatten();
+    let geometry = found.ok_or(RecordingError::NoGeometry { format: opened.format })?;
+    let sentence = format!(
+        "{} because events lie in columns 0 to {x_max} and rows 0 to {y_max} (the file does not say its size; --geometry overrides)",
+        geometry::show(geometry)
+    );
+    Ok((geometry, sentence))
+}
+
+/// Recognises the format by its first bytes.
+fn sniff(mut input: Input, unpack: bool) -> Result<Opened, RecordingError> {
+    let head = input.peek(SNIFF_BYTES)?;
+    if head.is_empty() {
+        return Err(RecordingError::Empty);
+    }
+    if head.starts_with(&[0x1f, 0x8b]) && unpack {
+        let mut opened = sniff(Input::new(Box::new(MultiGzDecoder::new(input))), false)?;
+        opened.about.push(("compression".to_owned(), "gzip".to_owned()));
+        return Ok(opened);
+    }
+    if head.starts_with(aedat4::MAGIC) {
+        return aedat4::open(input);
+    }
+    if head.starts_with(b"%") {
+        return prophesee(input);
+    }
+    if csv::is_text(head) {
+        return csv::open(input);
+    }
+    Err(RecordingError::Unknown {
+        found: format!("binary data that begins with {:02x?}", &head[..head.len().min(8)]),
+        advice: "evtach reads RAW (EVT2, EVT3), DAT, AEDAT4 and CSV",
+    })
+}
+
+fn prophesee(mut input: Input) -> Result<Opened, RecordingError> {
+    let header = Header::peek(&mut input)?;
+    if header.get("evt").is_some() || header.get("format").is_some() {
+        return raw::open(input, header);
+    }
+    let start = header.length;
+    let bytes = input.peek(start + SNIFF_BYTES)?;
+    let data = bytes.get(start..).unwrap_or_default();
+    if dat::is_dat(data) {
+        return Ok(dat::open(input, header));
+    }
+    if csv::is_text(data) {
+        return csv::open(input);
+    }
+    Err(RecordingError::Unknown {
+        found: "a Prophesee header without an \"evt\" or \"format\" line".to_owned(),
+        advice: "add the line \"% evt 2.0\" or \"% evt 3.0\" to its header, whichever the camera wrote",
+    })
+}

@@ -1,0 +1,149 @@
+//! Writing recordings.
+
+use std::fs::File;
+use std::io::{BufWriter, Seek, Write};
+use std::path::Path;
+
+use evtach_core::{Event, Geometry};
+
+use super::aedat4::Aedat4Writer;
+use super::csv::CsvWriter;
+use super::dat::DatWriter;
+use super::error::RecordingError;
+use super::raw::{Evt2Writer, Evt3Writer};
+
+/// A format that can be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum WriteFormat {
+    /// Prophesee RAW, EVT 2.0.
+    Evt2,
+    /// Prophesee RAW, EVT 3.0.
+    Evt3,
+    /// Prophesee DAT.
+    Dat,
+    /// iniVation AEDAT 4, LZ4.
+    Aedat4,
+    /// Text `t,x,y,p` with a header line, microseconds, 0/1.
+    Csv,
+}
+
+impl WriteFormat {
+    /// Every format, in the order of the documentation.
+    pub const ALL: [Self; 5] = [Self::Evt2, Self::Evt3, Self::Dat, Self::Aedat4, Self::Csv];
+
+    /// The name used on the command line.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Evt2 => "evt2",
+            Self::Evt3 => "evt3",
+            Self::Dat => "dat",
+            Self::Aedat4 => "aedat4",
+            Self::Csv => "csv",
+        }
+    }
+
+    /// The format a file name asks for: by `.evt2.raw` and the like, else by its extension (`.raw` is EVT 3.0).
+    #[must_use]
+    pub fn from_path(path: &Path) -> Option<Self> {
+        let name = path.file_name()?.to_str()?.to_ascii_lowercase();
+        let mut parts = name.rsplit('.');
+        match (parts.next()?, parts.next()) {
+            ("raw", Some("evt2")) | ("evt2", _) => Some(Self::Evt2),
+            ("raw" | "evt3", _) => Some(Self::Evt3),
+            ("dat", _) => Some(Self::Dat),
+            ("aedat4", _) => Some(Self::Aedat4),
+            ("csv", _) => Some(Self::Csv),
+            _ => None,
+        }
+    }
+}
+
+/// A recording being written. Without [`Writer::finish`] the file may be cut short.
+pub struct Writer {
+    sink: Box<dyn Sink>,
+}
+
+impl Writer {
+    /// Appends events.
+    ///
+    /// # Errors
+    /// When the disk or pipe fails, or an event does not fit the format.
+    pub fn write(&mut self, events: &[Event]) -> Result<(), RecordingError> {
+        self.sink.write(events)
+    }
+
+    /// Closes the recording.
+    ///
+    /// # Errors
+    /// When the disk or pipe fails.
+    pub fn finish(self) -> Result<(), RecordingError> {
+        self.sink.finish()
+    }
+}
+
+/// Creates a recording; "-" writes to stdout.
+///
+/// # Errors
+/// When the file cannot be created.
+pub fn create(
+    path: &Path,
+    format: WriteFormat,
+    geometry: Geometry,
+) -> Result<Writer, RecordingError> {
+    let target = if path.as_os_str() == "-" {
+        Target::Pipe(Box::new(BufWriter::new(std::io::stdout())))
+    } else {
+        let file = File::create(path)
+            .map_err(|source| RecordingError::Open { path: path.display().to_string(), source })?;
+        Target::File(BufWriter::with_capacity(1 << 18, file))
+    };
+    let sink: Box<dyn Sink> = match format {
+        WriteFormat::Evt2 => Box::new(Evt2Writer::new(target, geometry)?),
+        WriteFormat::Evt3 => Box::new(Evt3Writer::new(target, geometry)?),
+        WriteFormat::Dat => Box::new(DatWriter::new(target, geometry)?),
+        WriteFormat::Aedat4 => Box::new(Aedat4Writer::new(target, geometry)?),
+        WriteFormat::Csv => Box::new(CsvWriter::new(target)?),
+    };
+    Ok(Writer { sink })
+}
+
+/// One format's writer.
+pub(crate) trait Sink: Send {
+    fn write(&mut self, events: &[Event]) -> Result<(), RecordingError>;
+    fn finish(self: Box<Self>) -> Result<(), RecordingError>;
+}
+
+/// Where the bytes go: only a file can be patched afterwards.
+pub(crate) enum Target {
+    File(BufWriter<File>),
+    Pipe(Box<dyn Write + Send>),
+}
+
+impl Target {
+    /// Overwrites bytes written before, where that is possible.
+    pub fn patch(&mut self, offset: u64, bytes: &[u8]) -> std::io::Result<()> {
+        if let Self::File(file) = self {
+            file.seek(std::io::SeekFrom::Start(offset))?;
+            file.write_all(bytes)?;
+            file.seek(std::io::SeekFrom::End(0))?;
+        }
+        Ok(())
+    }
+}
+
+impl Write for Target {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        match self {
+            Self::File(file) => file.write(bytes),
+            Self::Pipe(pipe) => pipe.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        match self {
+            Self::File(file) => file.flush(),
+            Self::Pipe(pipe) => pipe.flush(),
+        }
+    }
+}
