@@ -1,11 +1,17 @@
 //! Event recordings: one folder a format, found by looking inside.
 
+mod aedat2;
+mod aedat3;
 mod aedat4;
+mod clock;
 mod csv;
 mod dat;
 mod error;
+mod es;
 mod geometry;
+mod imu;
 mod input;
+mod npy;
 mod open;
 mod prophesee_header;
 mod raw;
@@ -14,6 +20,7 @@ pub mod write;
 use evtach_core::{Event, Geometry};
 
 pub use error::{Place, RecordingError};
+pub use imu::ImuSample;
 pub use open::open;
 
 /// Parses a sensor size such as "640x480".
@@ -60,6 +67,8 @@ pub struct Side {
     pub wraps: u64,
     /// Events dropped because the stream had not told the time yet.
     pub untimed: u64,
+    /// Inertial samples since they were last taken.
+    pub imu: Vec<ImuSample>,
     /// What a person should know, one sentence each: cut files, skipped streams.
     pub notes: Vec<String>,
 }
@@ -174,6 +183,11 @@ impl Recording {
     #[must_use]
     pub const fn side(&self) -> &Side {
         &self.side
+    }
+
+    /// The inertial samples read since the last call, in the camera's axes.
+    pub fn take_imu(&mut self) -> Vec<ImuSample> {
+        std::mem::take(&mut self.side.imu)
     }
 
     /// Events so far that the sensor or the link reported lost.

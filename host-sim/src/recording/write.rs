@@ -10,6 +10,8 @@ use super::aedat4::Aedat4Writer;
 use super::csv::CsvWriter;
 use super::dat::DatWriter;
 use super::error::RecordingError;
+use super::es::EsWriter;
+use super::npy::NpyWriter;
 use super::raw::{Evt2Writer, Evt3Writer};
 
 /// A format that can be written.
@@ -25,11 +27,16 @@ pub enum WriteFormat {
     Aedat4,
     /// Text `t,x,y,p` with a header line, microseconds, 0/1.
     Csv,
+    /// NumPy structured array.
+    Npy,
+    /// Event Stream 2, type DVS.
+    Es,
 }
 
 impl WriteFormat {
     /// Every format, in the order of the documentation.
-    pub const ALL: [Self; 5] = [Self::Evt2, Self::Evt3, Self::Dat, Self::Aedat4, Self::Csv];
+    pub const ALL: [Self; 7] =
+        [Self::Evt2, Self::Evt3, Self::Dat, Self::Aedat4, Self::Csv, Self::Npy, Self::Es];
 
     /// The name used on the command line.
     #[must_use]
@@ -40,6 +47,8 @@ impl WriteFormat {
             Self::Dat => "dat",
             Self::Aedat4 => "aedat4",
             Self::Csv => "csv",
+            Self::Npy => "npy",
+            Self::Es => "es",
         }
     }
 
@@ -53,7 +62,9 @@ impl WriteFormat {
             ("raw" | "evt3", _) => Some(Self::Evt3),
             ("dat", _) => Some(Self::Dat),
             ("aedat4", _) => Some(Self::Aedat4),
-            ("csv", _) => Some(Self::Csv),
+            ("csv" | "txt", _) => Some(Self::Csv),
+            ("npy", _) => Some(Self::Npy),
+            ("es", _) => Some(Self::Es),
             _ => None,
         }
     }
@@ -104,6 +115,8 @@ pub fn create(
         WriteFormat::Dat => Box::new(DatWriter::new(target, geometry)?),
         WriteFormat::Aedat4 => Box::new(Aedat4Writer::new(target, geometry)?),
         WriteFormat::Csv => Box::new(CsvWriter::new(target)?),
+        WriteFormat::Npy => Box::new(NpyWriter::new(target)?),
+        WriteFormat::Es => Box::new(EsWriter::new(target, geometry)?),
     };
     Ok(Writer { sink })
 }
@@ -121,6 +134,11 @@ pub(crate) enum Target {
 }
 
 impl Target {
+    /// Whether bytes written before can still be changed.
+    pub const fn can_patch(&self) -> bool {
+        matches!(self, Self::File(_))
+    }
+
     /// Overwrites bytes written before, where that is possible.
     pub fn patch(&mut self, offset: u64, bytes: &[u8]) -> std::io::Result<()> {
         if let Self::File(file) = self {
