@@ -21,6 +21,7 @@ use evtach_core::{Event, Geometry};
 
 pub use error::{Place, RecordingError};
 pub use imu::ImuSample;
+use open::Progress;
 pub use open::open;
 
 /// Parses a sensor size such as "640x480".
@@ -84,6 +85,7 @@ pub struct Recording {
     /// What the header tells: sensor, serial number, software.
     pub about: Vec<(String, String)>,
     source: Box<dyn Source>,
+    progress: Progress,
     side: Side,
     out_of_order: u64,
     out_of_bounds: u64,
@@ -96,13 +98,14 @@ impl Recording {
     /// Events kept from growing without bound when a reader hands out little at a time.
     const CHUNK_EVENTS: usize = 16_384;
 
-    fn new(opened: Opened, geometry: Geometry) -> Self {
+    fn new(opened: Opened, geometry: Geometry, progress: Progress) -> Self {
         Self {
             format: opened.format,
             geometry,
             assumed: opened.assumed,
             about: opened.about,
             source: opened.source,
+            progress,
             side: Side::default(),
             out_of_order: 0,
             out_of_bounds: 0,
@@ -183,6 +186,12 @@ impl Recording {
     #[must_use]
     pub const fn side(&self) -> &Side {
         &self.side
+    }
+
+    /// Bytes of the file read so far, for a progress bar (not counted inside .npz).
+    #[must_use]
+    pub fn bytes_read(&self) -> u64 {
+        self.progress.bytes()
     }
 
     /// The inertial samples read since the last call, in the camera's axes.

@@ -1,7 +1,10 @@
 //! Finds out what a file is by looking inside, and opens it.
 
 use std::fs::File;
+use std::io::Read;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use evtach_core::{Event, Geometry};
 use flate2::read::MultiGzDecoder;
@@ -21,7 +24,8 @@ const SNIFF_BYTES: usize = 4096;
 /// # Errors
 /// When the file cannot be read, is no known recording, or its sensor size is neither told nor inferable.
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Recording, RecordingError> {
-    let mut opened = sniff(input(path)?, path, options.geometry, true)?;
+    let progress = Progress::default();
+    let mut opened = sniff(input(path, &progress)?, path, options.geometry, true)?;
     let geometry = if let Some(geometry) = options.geometry {
         opened.assumed = vec![format!("{} as given by --geometry", geometry::show(geometry))];
         geometry
@@ -32,20 +36,54 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Recording, RecordingEr
             return Err(RecordingError::NoGeometry { format: opened.format });
         }
         let (geometry, sentence) = scan(&mut opened)?;
-        opened = sniff(input(path)?, path, Some(geometry), true)?;
+        opened = sniff(input(path, &progress)?, path, Some(geometry), true)?;
         opened.assumed.push(sentence);
         geometry
     };
-    Ok(Recording::new(opened, geometry))
+    Ok(Recording::new(opened, geometry, progress))
 }
 
-fn input(path: &Path) -> Result<Input, RecordingError> {
+fn input(path: &Path, progress: &Progress) -> Result<Input, RecordingError> {
+    let read = Arc::clone(&progress.read);
     if path.as_os_str() == "-" {
-        return Ok(Input::new(Box::new(std::io::stdin())));
+        return Ok(Input::new(Box::new(Counted { reader: std::io::stdin(), read })));
     }
-    let file = File::open(path)
-        .map_err(|source| RecordingError::Open { path: path.display().to_string(), source })?;
-    Ok(Input::new(Box::new(file)))
+    let opening = |source| RecordingError::Open { path: path.display().to_string(), source };
+    if std::fs::metadata(path).map_err(opening)?.is_dir() {
+        return Err(RecordingError::Unsupported {
+            what: "this is a folder".to_owned(),
+            advice: "give the recording in it; of a ROS 2 bag the .db3 or .mcap file".to_owned(),
+        });
+    }
+    read.store(0, Ordering::Relaxed);
+    let file = File::open(path).map_err(opening)?;
+    Ok(Input::new(Box::new(Counted { reader: file, read })))
+}
+
+/// How far reading got, in bytes of the file.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Progress {
+    read: Arc<AtomicU64>,
+}
+
+impl Progress {
+    pub fn bytes(&self) -> u64 {
+        self.read.load(Ordering::Relaxed)
+    }
+}
+
+/// Counts what is read, below any decompressor.
+struct Counted<R> {
+    reader: R,
+    read: Arc<AtomicU64>,
+}
+
+impl<R: Read> Read for Counted<R> {
+    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
+        let count = self.reader.read(out)?;
+        self.read.fetch_add(count as u64, Ordering::Relaxed);
+        Ok(count)
+    }
 }
 
 /// Reads through a recording to see where its events lie.

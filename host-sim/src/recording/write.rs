@@ -52,6 +52,18 @@ impl WriteFormat {
         }
     }
 
+    /// Last time the format can hold, in microseconds, and whether its events must come in the order of time.
+    #[must_use]
+    pub const fn limits(self) -> (u64, bool) {
+        match self {
+            Self::Evt2 => ((1 << 34) - 1, true),
+            Self::Evt3 => ((1 << 38) - 1, true),
+            Self::Dat => ((1 << 32) - 1, false),
+            Self::Es => (3_600_000_000, true),
+            Self::Aedat4 | Self::Csv | Self::Npy => (i64::MAX as u64, false),
+        }
+    }
+
     /// The format a file name asks for: by `.evt2.raw` and the like, else by its extension (`.raw` is EVT 3.0).
     #[must_use]
     pub fn from_path(path: &Path) -> Option<Self> {
@@ -67,6 +79,17 @@ impl WriteFormat {
             ("es", _) => Some(Self::Es),
             _ => None,
         }
+    }
+}
+
+impl std::str::FromStr for WriteFormat {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Self::ALL.into_iter().find(|format| format.as_str() == text).ok_or_else(|| {
+            let known: Vec<&str> = Self::ALL.iter().map(|format| format.as_str()).collect();
+            format!("\"{text}\" is no format that is written; take one of {}", known.join(", "))
+        })
     }
 }
 
