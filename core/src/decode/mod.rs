@@ -3,11 +3,18 @@
 //! Each decoder is a small state machine: one word in, the events it completes out through a closure. Time leaves
 //! as `u64` microseconds with the wraps of the wire's own counter already undone.
 
+mod davis;
+mod dvxplorer;
 mod evt2;
+mod evt21;
 mod evt3;
+mod inivation;
 
+pub use davis::{Davis, Mounting};
+pub use dvxplorer::Dvxplorer;
 pub use evt2::Evt2;
 pub use evt3::Evt3;
+pub use evt21::Evt21;
 
 use crate::event::Polarity;
 

@@ -1,12 +1,288 @@
 //! `evtach convert`.
 
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+
+use anyhow::{Context, bail};
+use evtach_core::{Event, Geometry};
+use evtach_host::recording::write::{self, WriteFormat};
+use evtach_host::recording::{self, OpenOptions};
+use indicatif::{ProgressBar, ProgressStyle};
 
 /// Arguments of `evtach convert`.
 #[derive(clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// Recording to read; "-" reads stdin.
+    input: PathBuf,
+    /// Recording to write, its format by the extension (.raw is EVT3, .evt2.raw is EVT2); "-" writes to stdout.
+    output: PathBuf,
+    /// Format to write, whatever the extension: evt2, evt3, dat, aedat4, csv, npy, es.
+    #[arg(long, value_name = "FORMAT")]
+    to: Option<WriteFormat>,
+    /// Size of the sensor, where the recording does not say it or says it wrong.
+    #[arg(long, value_name = "WxH", value_parser = recording::parse_geometry)]
+    geometry: Option<Geometry>,
+    /// Keep only the events in this rectangle of pixels; places stay as they are.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse_roi)]
+    roi: Option<[u16; 4]>,
+    /// Leave out what comes before this many seconds from the first event.
+    #[arg(long, value_name = "S")]
+    start: Option<f64>,
+    /// Leave out what comes after this many seconds from the first event.
+    #[arg(long, value_name = "S")]
+    end: Option<f64>,
+    /// Keep one event in N.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
+    decimate: u64,
+    /// Let time begin at zero. Without it times stay as they are wherever the format can hold them.
+    #[arg(long)]
+    rebase: bool,
+}
+
+fn parse_roi(text: &str) -> Result<[u16; 4], String> {
+    let sides: Option<Vec<u16>> = text.split(',').map(|side| side.trim().parse().ok()).collect();
+    sides
+        .and_then(|sides| <[u16; 4]>::try_from(sides).ok())
+        .filter(|&[_, _, width, height]| width > 0 && height > 0)
+        .ok_or_else(|| format!("\"{text}\" is no rectangle; write x,y,width,height in pixels"))
+}
 
 /// Runs the subcommand.
-pub fn run(_args: Args) -> anyhow::Result<ExitCode> {
-    anyhow::bail!("not there yet")
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let Some(format) = args.to.or_else(|| WriteFormat::from_path(&args.output)) else {
+        bail!(
+            "cannot tell the format to write from \"{}\"\nhelp: give it with --to",
+            args.output.display()
+        );
+    };
+    if is_same_file(&args.input, &args.output) {
+        bail!("input and output are the same file\nhelp: write to another name");
+    }
+    let name = args.input.display().to_string();
+    let options = OpenOptions { geometry: args.geometry };
+    let mut recording = recording::open(&args.input, &options).with_context(|| name.clone())?;
+    for sentence in &recording.assumed {
+        eprintln!("assumed: {sentence}");
+    }
+    let mut writer = write::create(&args.output, format, recording.geometry)
+        .with_context(|| args.output.display().to_string())?;
+    let bar = progress_bar(&args.input);
+    let mut picker = Picker::new(&args, format);
+    let mut chunk: Vec<Event> = Vec::new();
+    let mut picked: Vec<Event> = Vec::new();
+    let mut failure = None;
+    loop {
+        chunk.clear();
+        picked.clear();
+        // What came before the damage is written all the same.
+        let more = recording.read_chunk(&mut chunk).unwrap_or_else(|error| {
+            failure = Some(error);
+            false
+        });
+        let more = picker.take(&chunk, &mut picked) && more;
+        if !more {
+            picker.flush(&mut picked);
+        }
+        writer.write(&picked).with_context(|| args.output.display().to_string())?;
+        bar.set_position(recording.bytes_read());
+        if !more {
+            break;
+        }
+    }
+    writer.finish().with_context(|| args.output.display().to_string())?;
+    bar.finish_and_clear();
+    for note in &recording.side().notes {
+        eprintln!("note: {note}");
+    }
+    picker.report(recording.out_of_bounds());
+    match failure {
+        Some(error) => Err(error).with_context(|| name),
+        None => Ok(ExitCode::SUCCESS),
+    }
+}
+
+fn is_same_file(input: &Path, output: &Path) -> bool {
+    match (input.canonicalize(), output.canonicalize()) {
+        (Ok(input), Ok(output)) => input == output && input.is_file(),
+        _ => false,
+    }
+}
+
+fn progress_bar(input: &Path) -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:30} {bytes}/{total_bytes} {eta}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    match std::fs::metadata(input) {
+        Ok(file) if file.is_file() => ProgressBar::new(file.len()).with_style(style),
+        _ => ProgressBar::no_length(),
+    }
+}
+
+/// Chooses, shifts and, where the format needs it, sorts the events.
+struct Picker {
+    roi: Option<[u16; 4]>,
+    start_us: u64,
+    end_us: u64,
+    decimate: u64,
+    rebase: bool,
+    latest_us: u64,
+    format: WriteFormat,
+    /// Time of the first event, and what is taken off every time.
+    origin: Option<(u64, u64)>,
+    seen: u64,
+    written: u64,
+    sorter: Option<Sorter>,
+}
+
+impl Picker {
+    fn new(args: &Args, format: WriteFormat) -> Self {
+        let (latest_us, ordered) = format.limits();
+        let micros = |seconds: f64| (seconds * 1e6).round() as u64;
+        Self {
+            roi: args.roi,
+            start_us: args.start.map_or(0, micros),
+            end_us: args.end.map_or(u64::MAX, micros),
+            decimate: args.decimate,
+            rebase: args.rebase,
+            latest_us,
+            format,
+            origin: None,
+            seen: 0,
+            written: 0,
+            sorter: ordered.then(Sorter::default),
+        }
+    }
+
+    /// Takes in events; `false` when none behind them will be wanted.
+    fn take(&mut self, events: &[Event], out: &mut Vec<Event>) -> bool {
+        let mut wanted = true;
+        for event in events {
+            let (first_us, shift_us) = self.origin(event.t_us);
+            let since_us = event.t_us.saturating_sub(first_us);
+            if since_us > self.end_us {
+                wanted = false;
+                break;
+            }
+            let inside = self.roi.is_none_or(|[x, y, width, height]| {
+                event.x.checked_sub(x).is_some_and(|column| column < width)
+                    && event.y.checked_sub(y).is_some_and(|row| row < height)
+            });
+            if since_us < self.start_us || !inside {
+                continue;
+            }
+            self.seen += 1;
+            if !(self.seen - 1).is_multiple_of(self.decimate) {
+                continue;
+            }
+            let event = Event { t_us: event.t_us.saturating_sub(shift_us), ..*event };
+            self.written += 1;
+            match &mut self.sorter {
+                Some(sorter) => sorter.push(event),
+                None => out.push(event),
+            }
+        }
+        if let Some(sorter) = &mut self.sorter {
+            sorter.release(out, false);
+        }
+        wanted
+    }
+
+    fn origin(&mut self, t_us: u64) -> (u64, u64) {
+        *self.origin.get_or_insert_with(|| {
+            // A minute of headroom: the recording goes on from its first event.
+            let shift = self.rebase || t_us + 60_000_000 > self.latest_us;
+            if shift && !self.rebase {
+                eprintln!(
+                    "note: time begins at zero, because {} cannot hold {t_us} us",
+                    self.format.as_str()
+                );
+            }
+            // Zero is where the kept part begins.
+            (t_us, if shift { t_us.saturating_add(self.start_us) } else { 0 })
+        })
+    }
+
+    fn flush(&mut self, out: &mut Vec<Event>) {
+        if let Some(sorter) = &mut self.sorter {
+            sorter.release(out, true);
+        }
+    }
+
+    fn report(&self, out_of_bounds: u64) {
+        let left_out = self.seen - self.written;
+        eprintln!("{} events written", self.written);
+        if left_out > 0 {
+            eprintln!("{left_out} events left out by --decimate");
+        }
+        if out_of_bounds > 0 {
+            eprintln!("{out_of_bounds} events outside the sensor left out");
+        }
+        if let Some(sorter) = &self.sorter
+            && sorter.moved > 0
+        {
+            eprintln!(
+                "{} events put into the order of time, which {} needs",
+                sorter.moved,
+                self.format.as_str()
+            );
+        }
+    }
+}
+
+/// Puts events into the order of time within a span; what comes later than that is for the writer to refuse.
+#[derive(Default)]
+struct Sorter {
+    held: Vec<Event>,
+    latest_us: u64,
+    moved: u64,
+}
+
+impl Sorter {
+    /// Sensors mix up events within microseconds, recorders within some packets.
+    const SPAN_US: u64 = 20_000;
+
+    fn push(&mut self, event: Event) {
+        self.moved += u64::from(event.t_us < self.latest_us);
+        self.latest_us = self.latest_us.max(event.t_us);
+        self.held.push(event);
+    }
+
+    fn release(&mut self, out: &mut Vec<Event>, all: bool) {
+        if self.moved > 0 {
+            // Stable: events of one microsecond stay in their order.
+            self.held.sort_by_key(|event| event.t_us);
+        }
+        let until = if all { u64::MAX } else { self.latest_us.saturating_sub(Self::SPAN_US) };
+        let ready = self.held.partition_point(|event| event.t_us <= until);
+        out.extend(self.held.drain(..ready));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use evtach_core::Polarity;
+
+    use super::*;
+
+    #[test]
+    fn sorter_mends_small_steps_back() {
+        let at = |t_us| Event { t_us, x: 0, y: 0, polarity: Polarity::On };
+        let mut sorter = Sorter::default();
+        let mut out = Vec::new();
+        for t_us in [0, 5, 3, 30_000, 29_999, 60_000] {
+            sorter.push(at(t_us));
+            sorter.release(&mut out, false);
+        }
+        sorter.release(&mut out, true);
+        let times: Vec<u64> = out.iter().map(|event| event.t_us).collect();
+        assert_eq!(times, [0, 3, 5, 29_999, 30_000, 60_000]);
+        assert_eq!(sorter.moved, 2);
+    }
+
+    #[test]
+    fn rectangles_are_checked() {
+        assert_eq!(parse_roi("1,2,3,4"), Ok([1, 2, 3, 4]));
+        for text in ["", "1,2,3", "1,2,0,4", "1,2,3,4,5", "-1,2,3,4", "a,2,3,4"] {
+            assert!(parse_roi(text).is_err(), "{text}");
+        }
+    }
 }

@@ -36,6 +36,11 @@ impl Input {
         Ok(&self.buffer[self.start..self.end])
     }
 
+    /// The bytes that are already there.
+    pub fn buffered(&self) -> &[u8] {
+        &self.buffer[self.start..self.end]
+    }
+
     fn fill(&mut self, want: usize) -> Result<(), RecordingError> {
         if self.start > 0 {
             self.buffer.copy_within(self.start..self.end, 0);

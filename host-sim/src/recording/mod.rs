@@ -1,11 +1,17 @@
 //! Event recordings: one folder a format, found by looking inside.
 
+mod aedat2;
+mod aedat3;
 mod aedat4;
+mod clock;
 mod csv;
 mod dat;
 mod error;
+mod es;
 mod geometry;
+mod imu;
 mod input;
+mod npy;
 mod open;
 mod prophesee_header;
 mod raw;
@@ -14,6 +20,8 @@ pub mod write;
 use evtach_core::{Event, Geometry};
 
 pub use error::{Place, RecordingError};
+pub use imu::ImuSample;
+use open::Progress;
 pub use open::open;
 
 /// Parses a sensor size such as "640x480".
@@ -60,6 +68,8 @@ pub struct Side {
     pub wraps: u64,
     /// Events dropped because the stream had not told the time yet.
     pub untimed: u64,
+    /// Inertial samples since they were last taken.
+    pub imu: Vec<ImuSample>,
     /// What a person should know, one sentence each: cut files, skipped streams.
     pub notes: Vec<String>,
 }
@@ -75,6 +85,7 @@ pub struct Recording {
     /// What the header tells: sensor, serial number, software.
     pub about: Vec<(String, String)>,
     source: Box<dyn Source>,
+    progress: Progress,
     side: Side,
     out_of_order: u64,
     out_of_bounds: u64,
@@ -87,13 +98,14 @@ impl Recording {
     /// Events kept from growing without bound when a reader hands out little at a time.
     const CHUNK_EVENTS: usize = 16_384;
 
-    fn new(opened: Opened, geometry: Geometry) -> Self {
+    fn new(opened: Opened, geometry: Geometry, progress: Progress) -> Self {
         Self {
             format: opened.format,
             geometry,
             assumed: opened.assumed,
             about: opened.about,
             source: opened.source,
+            progress,
             side: Side::default(),
             out_of_order: 0,
             out_of_bounds: 0,
@@ -174,6 +186,17 @@ impl Recording {
     #[must_use]
     pub const fn side(&self) -> &Side {
         &self.side
+    }
+
+    /// Bytes of the file read so far, for a progress bar (not counted inside .npz).
+    #[must_use]
+    pub fn bytes_read(&self) -> u64 {
+        self.progress.bytes()
+    }
+
+    /// The inertial samples read since the last call, in the camera's axes.
+    pub fn take_imu(&mut self) -> Vec<ImuSample> {
+        std::mem::take(&mut self.side.imu)
     }
 
     /// Events so far that the sensor or the link reported lost.

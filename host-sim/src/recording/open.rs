@@ -1,15 +1,20 @@
 //! Finds out what a file is by looking inside, and opens it.
 
 use std::fs::File;
+use std::io::Read;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
-use evtach_core::Event;
+use evtach_core::{Event, Geometry};
 use flate2::read::MultiGzDecoder;
 
 use super::error::RecordingError;
 use super::input::Input;
 use super::prophesee_header::Header;
-use super::{OpenOptions, Opened, Recording, Side, aedat4, csv, dat, geometry, raw};
+use super::{
+    OpenOptions, Opened, Recording, Side, aedat2, aedat3, aedat4, csv, dat, es, geometry, npy, raw,
+};
 
 /// Bytes looked at to tell text from binary.
 const SNIFF_BYTES: usize = 4096;
@@ -19,7 +24,8 @@ const SNIFF_BYTES: usize = 4096;
 /// # Errors
 /// When the file cannot be read, is no known recording, or its sensor size is neither told nor inferable.
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Recording, RecordingError> {
-    let mut opened = sniff(input(path)?, true)?;
+    let progress = Progress::default();
+    let mut opened = sniff(input(path, &progress)?, path, options.geometry, true)?;
     let geometry = if let Some(geometry) = options.geometry {
         opened.assumed = vec![format!("{} as given by --geometry", geometry::show(geometry))];
         geometry
@@ -30,24 +36,58 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Recording, RecordingEr
             return Err(RecordingError::NoGeometry { format: opened.format });
         }
         let (geometry, sentence) = scan(&mut opened)?;
-        opened = sniff(input(path)?, true)?;
+        opened = sniff(input(path, &progress)?, path, Some(geometry), true)?;
         opened.assumed.push(sentence);
         geometry
     };
-    Ok(Recording::new(opened, geometry))
+    Ok(Recording::new(opened, geometry, progress))
 }
 
-fn input(path: &Path) -> Result<Input, RecordingError> {
+fn input(path: &Path, progress: &Progress) -> Result<Input, RecordingError> {
+    let read = Arc::clone(&progress.read);
     if path.as_os_str() == "-" {
-        return Ok(Input::new(Box::new(std::io::stdin())));
+        return Ok(Input::new(Box::new(Counted { reader: std::io::stdin(), read })));
     }
-    let file = File::open(path)
-        .map_err(|source| RecordingError::Open { path: path.display().to_string(), source })?;
-    Ok(Input::new(Box::new(file)))
+    let opening = |source| RecordingError::Open { path: path.display().to_string(), source };
+    if std::fs::metadata(path).map_err(opening)?.is_dir() {
+        return Err(RecordingError::Unsupported {
+            what: "this is a folder".to_owned(),
+            advice: "give the recording in it; of a ROS 2 bag the .db3 or .mcap file".to_owned(),
+        });
+    }
+    read.store(0, Ordering::Relaxed);
+    let file = File::open(path).map_err(opening)?;
+    Ok(Input::new(Box::new(Counted { reader: file, read })))
+}
+
+/// How far reading got, in bytes of the file.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Progress {
+    read: Arc<AtomicU64>,
+}
+
+impl Progress {
+    pub fn bytes(&self) -> u64 {
+        self.read.load(Ordering::Relaxed)
+    }
+}
+
+/// Counts what is read, below any decompressor.
+struct Counted<R> {
+    reader: R,
+    read: Arc<AtomicU64>,
+}
+
+impl<R: Read> Read for Counted<R> {
+    fn read(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
+        let count = self.reader.read(out)?;
+        self.read.fetch_add(count as u64, Ordering::Relaxed);
+        Ok(count)
+    }
 }
 
 /// Reads through a recording to see where its events lie.
-fn scan(opened: &mut Opened) -> Result<(evtach_core::Geometry, String), RecordingError> {
+fn scan(opened: &mut Opened) -> Result<(Geometry, String), RecordingError> {
     let mut events: Vec<Event> = Vec::new();
     let (mut x_max, mut y_max) = (0, 0);
     let mut any = false;
@@ -75,19 +115,57 @@ fn scan(opened: &mut Opened) -> Result<(evtach_core::Geometry, String), Recordin
     Ok((geometry, sentence))
 }
 
-/// Recognises the format by its first bytes.
-fn sniff(mut input: Input, unpack: bool) -> Result<Opened, RecordingError> {
+/// Recognises the format by its first bytes. Some formats count rows or columns from the other end: they need the
+/// size to turn them round, `known` where the file does not tell it.
+fn sniff(
+    mut input: Input,
+    path: &Path,
+    known: Option<Geometry>,
+    unpack: bool,
+) -> Result<Opened, RecordingError> {
     let head = input.peek(SNIFF_BYTES)?;
     if head.is_empty() {
         return Err(RecordingError::Empty);
     }
     if head.starts_with(&[0x1f, 0x8b]) && unpack {
-        let mut opened = sniff(Input::new(Box::new(MultiGzDecoder::new(input))), false)?;
+        let mut opened =
+            sniff(Input::new(Box::new(MultiGzDecoder::new(input))), path, known, false)?;
         opened.about.push(("compression".to_owned(), "gzip".to_owned()));
         return Ok(opened);
     }
     if head.starts_with(aedat4::MAGIC) {
         return aedat4::open(input);
+    }
+    if head.starts_with(aedat2::MAGIC_2) {
+        return aedat2::open(input, "AEDAT2", 4, known);
+    }
+    if head.starts_with(aedat2::MAGIC_1) {
+        return aedat2::open(input, "AEDAT1", 2, known);
+    }
+    if head.starts_with(aedat3::MAGIC) {
+        return aedat3::open(input, known);
+    }
+    if head.starts_with(es::MAGIC) {
+        return es::open(input);
+    }
+    if head.starts_with(npy::MAGIC) {
+        return npy::open(input);
+    }
+    if head.starts_with(npy::ZIP_MAGIC) {
+        return if path.as_os_str() == "-" || !unpack {
+            Err(needs_file("an .npz archive"))
+        } else {
+            npy::open_npz(path)
+        };
+    }
+    if head.starts_with(b"\x89HDF\r\n\x1a\n") {
+        return Err(hdf5());
+    }
+    if head.starts_with(b"#ROSBAG V") {
+        return Err(RecordingError::Unsupported {
+            what: "this is a ROS 1 bag".to_owned(),
+            advice: "convert it to ROS 2: pip install rosbags, then rosbags-convert --src FILE.bag --dst FOLDER".to_owned(),
+        });
     }
     if head.starts_with(b"%") {
         return prophesee(input);
@@ -97,8 +175,23 @@ fn sniff(mut input: Input, unpack: bool) -> Result<Opened, RecordingError> {
     }
     Err(RecordingError::Unknown {
         found: format!("binary data that begins with {:02x?}", &head[..head.len().min(8)]),
-        advice: "evtach reads RAW (EVT2, EVT3), DAT, AEDAT4 and CSV",
+        advice: "see the table of formats; RAW without its header needs the lines \"% evt 3.0\" and \"% geometry WxH\" in front",
     })
+}
+
+fn needs_file(what: &str) -> RecordingError {
+    RecordingError::Unsupported {
+        what: format!("{what} cannot be read from a pipe or inside another archive"),
+        advice: "save it to a file and give its name".to_owned(),
+    }
+}
+
+/// HDF5 event files are packed by Prophesee's own ECF codec, which no kept crate reads.
+fn hdf5() -> RecordingError {
+    RecordingError::Unsupported {
+        what: "this is an HDF5 file; its events are packed by Prophesee's ECF codec, which is not read here".to_owned(),
+        advice: "convert it with OpenEB: metavision_file_to_csv -i FILE.hdf5 -o FILE.csv, then give the CSV".to_owned(),
+    }
 }
 
 fn prophesee(mut input: Input) -> Result<Opened, RecordingError> {

@@ -10,6 +10,8 @@ use super::aedat4::Aedat4Writer;
 use super::csv::CsvWriter;
 use super::dat::DatWriter;
 use super::error::RecordingError;
+use super::es::EsWriter;
+use super::npy::NpyWriter;
 use super::raw::{Evt2Writer, Evt3Writer};
 
 /// A format that can be written.
@@ -25,11 +27,16 @@ pub enum WriteFormat {
     Aedat4,
     /// Text `t,x,y,p` with a header line, microseconds, 0/1.
     Csv,
+    /// NumPy structured array.
+    Npy,
+    /// Event Stream 2, type DVS.
+    Es,
 }
 
 impl WriteFormat {
     /// Every format, in the order of the documentation.
-    pub const ALL: [Self; 5] = [Self::Evt2, Self::Evt3, Self::Dat, Self::Aedat4, Self::Csv];
+    pub const ALL: [Self; 7] =
+        [Self::Evt2, Self::Evt3, Self::Dat, Self::Aedat4, Self::Csv, Self::Npy, Self::Es];
 
     /// The name used on the command line.
     #[must_use]
@@ -40,6 +47,20 @@ impl WriteFormat {
             Self::Dat => "dat",
             Self::Aedat4 => "aedat4",
             Self::Csv => "csv",
+            Self::Npy => "npy",
+            Self::Es => "es",
+        }
+    }
+
+    /// Last time the format can hold, in microseconds, and whether its events must come in the order of time.
+    #[must_use]
+    pub const fn limits(self) -> (u64, bool) {
+        match self {
+            Self::Evt2 => ((1 << 34) - 1, true),
+            Self::Evt3 => ((1 << 38) - 1, true),
+            Self::Dat => ((1 << 32) - 1, false),
+            Self::Es => (3_600_000_000, true),
+            Self::Aedat4 | Self::Csv | Self::Npy => (i64::MAX as u64, false),
         }
     }
 
@@ -53,9 +74,22 @@ impl WriteFormat {
             ("raw" | "evt3", _) => Some(Self::Evt3),
             ("dat", _) => Some(Self::Dat),
             ("aedat4", _) => Some(Self::Aedat4),
-            ("csv", _) => Some(Self::Csv),
+            ("csv" | "txt", _) => Some(Self::Csv),
+            ("npy", _) => Some(Self::Npy),
+            ("es", _) => Some(Self::Es),
             _ => None,
         }
+    }
+}
+
+impl std::str::FromStr for WriteFormat {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Self::ALL.into_iter().find(|format| format.as_str() == text).ok_or_else(|| {
+            let known: Vec<&str> = Self::ALL.iter().map(|format| format.as_str()).collect();
+            format!("\"{text}\" is no format that is written; take one of {}", known.join(", "))
+        })
     }
 }
 
@@ -104,6 +138,8 @@ pub fn create(
         WriteFormat::Dat => Box::new(DatWriter::new(target, geometry)?),
         WriteFormat::Aedat4 => Box::new(Aedat4Writer::new(target, geometry)?),
         WriteFormat::Csv => Box::new(CsvWriter::new(target)?),
+        WriteFormat::Npy => Box::new(NpyWriter::new(target)?),
+        WriteFormat::Es => Box::new(EsWriter::new(target, geometry)?),
     };
     Ok(Writer { sink })
 }
@@ -121,6 +157,11 @@ pub(crate) enum Target {
 }
 
 impl Target {
+    /// Whether bytes written before can still be changed.
+    pub const fn can_patch(&self) -> bool {
+        matches!(self, Self::File(_))
+    }
+
     /// Overwrites bytes written before, where that is possible.
     pub fn patch(&mut self, offset: u64, bytes: &[u8]) -> std::io::Result<()> {
         if let Self::File(file) = self {

@@ -67,6 +67,28 @@ impl<'b> Table<'b> {
         Some(self.buffer.get(start..end)?.as_chunks().0)
     }
 
+    /// A 32-bit float field.
+    pub fn f32(&self, index: usize) -> Option<f32> {
+        bytes(self.buffer, self.field(index)?).map(f32::from_le_bytes)
+    }
+
+    /// A vector of tables; empty when the field is absent, `None` when it lies.
+    pub fn tables(&self, index: usize) -> Option<Vec<Table<'b>>> {
+        let Some((start, length)) = self.vector(index) else {
+            return self.field(index).is_none().then(Vec::new);
+        };
+        // Each table takes at least its own offset: the length cannot claim more than the buffer holds.
+        if length > self.buffer.len() / 4 {
+            return None;
+        }
+        (0..length)
+            .map(|entry| {
+                let at = start.checked_add(4 * entry)?;
+                Some(Table { buffer: self.buffer, at: offset(self.buffer, at)? })
+            })
+            .collect()
+    }
+
     /// A string field.
     pub fn string(&self, index: usize) -> Option<&'b str> {
         let (start, length) = self.vector(index)?;

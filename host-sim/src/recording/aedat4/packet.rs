@@ -13,8 +13,8 @@ const MAX_UNPACKED_BYTES: usize = 256 << 20;
 
 /// What was found where a packet was expected.
 pub enum Found {
-    /// A packet of a wanted stream; its content is in the buffer.
-    Packet,
+    /// A packet of this wanted stream; its content is in the buffer.
+    Packet(i32),
     /// A packet of a stream that was not asked for.
     Skipped,
     /// The end of the packets.
@@ -72,7 +72,7 @@ impl Packets {
         let found = if wanted(stream) {
             unpack(self.compression, packed, &mut self.unpacked)
                 .map_err(|what| damaged(offset, what))?;
-            Found::Packet
+            Found::Packet(stream)
         } else {
             Found::Skipped
         };

@@ -6,6 +6,7 @@ use super::flat::Table;
 use super::header::Header;
 use super::packet::{Found, Packets};
 use crate::recording::error::{Place, RecordingError};
+use crate::recording::imu::{ImuSample, from_degrees, from_gravities};
 use crate::recording::input::Input;
 use crate::recording::{Opened, Side, Source, geometry};
 
@@ -44,6 +45,7 @@ pub(crate) fn open(mut input: Input) -> Result<Opened, RecordingError> {
     let source = Aedat4 {
         packets: Packets::new(input, header.compression, header.packets_end),
         stream: stream.id,
+        imu_stream: header.of_kind("IMUS").next().map(|stream| stream.id),
         notes: side_notes,
     };
     Ok(Opened {
@@ -58,6 +60,7 @@ pub(crate) fn open(mut input: Input) -> Result<Opened, RecordingError> {
 struct Aedat4 {
     packets: Packets,
     stream: i32,
+    imu_stream: Option<i32>,
     notes: Vec<String>,
 }
 
@@ -66,10 +69,19 @@ impl Source for Aedat4 {
         side.notes.append(&mut self.notes);
         let offset = self.packets.offset();
         let stream = self.stream;
-        match self.packets.next(|id| id == stream)? {
-            Found::Packet => {
-                take_events(self.packets.content(), events).map_err(|what| {
-                    RecordingError::Damaged { format: "AEDAT4", place: Place::Byte(offset), what }
+        let imu_stream = self.imu_stream;
+        match self.packets.next(|id| id == stream || Some(id) == imu_stream)? {
+            Found::Packet(id) => {
+                let content = self.packets.content();
+                let taken = if id == stream {
+                    take_events(content, events)
+                } else {
+                    take_imu(content, &mut side.imu)
+                };
+                taken.map_err(|what| RecordingError::Damaged {
+                    format: "AEDAT4",
+                    place: Place::Byte(offset),
+                    what,
                 })?;
                 Ok(true)
             }
@@ -109,6 +121,25 @@ fn take_events(content: &[u8], events: &mut Vec<Event>) -> Result<(), String> {
         let good = events.iter().position(|event| event.t_us > i64::MAX as u64);
         events.truncate(good.unwrap_or(events.len()));
         return Err("an event before the year 1970".to_owned());
+    }
+    Ok(())
+}
+
+/// Appends the samples of an IMUS packet: acceleration in g and rate in degrees per second, in the camera's axes.
+fn take_imu(content: &[u8], samples: &mut Vec<ImuSample>) -> Result<(), String> {
+    let tables = Table::root(content, b"IMUS")
+        .and_then(|table| table.tables(0))
+        .ok_or("an inertial packet that is no IMUS table")?;
+    for table in tables {
+        let three = |first: usize| {
+            [first, first + 1, first + 2].map(|field| table.f32(field).unwrap_or_default())
+        };
+        let t = table.i64(0).unwrap_or_default();
+        samples.push(ImuSample {
+            t_us: u64::try_from(t).map_err(|_| "an inertial sample before the year 1970")?,
+            accel_m_s2: from_gravities(three(2)),
+            gyro_rad_s: from_degrees(three(5)),
+        });
     }
     Ok(())
 }

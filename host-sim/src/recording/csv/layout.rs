@@ -25,7 +25,18 @@ impl Unit {
         }
     }
 
-    const fn name(self) -> &'static str {
+    /// Seconds are told by fractions finer than a millisecond between events closer than one second.
+    pub fn from_times(times: &[f64]) -> Self {
+        let fractional = times.iter().any(|t| (t * 1e3).fract() != 0.0 && t.fract() != 0.0);
+        let step = match (times.first(), times.last()) {
+            (Some(first), Some(last)) => (last - first).abs() / times.len() as f64,
+            _ => 0.0,
+        };
+        if fractional && step < 1.0 { Self::Seconds } else { Self::Microseconds }
+    }
+
+    /// Word for people.
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Seconds => "seconds",
             Self::Milliseconds => "milliseconds",
@@ -116,7 +127,7 @@ pub fn find(head: &str) -> Result<Layout, RecordingError> {
             if vendor_order { " (as %geometry files have them)" } else { " from the first rows" }
         ));
     }
-    layout.unit = told_unit.unwrap_or_else(|| unit_from_rows(&rows, layout.columns[0]));
+    layout.unit = told_unit.unwrap_or_else(|| Unit::from_times(&column(&rows, layout.columns[0])));
     let how = if told_unit.is_some() { "as its column says" } else { "from the first rows" };
     layout.assumed.push(format!("time in {}, {how}", layout.unit.name()));
     Ok(layout)
@@ -136,6 +147,36 @@ fn order(columns: [usize; 4]) -> String {
     named.iter().map(|(_, name)| *name).collect::<Vec<_>>().join(",")
 }
 
+/// Splits "timestamp [us]" or "t_us" into name and unit.
+pub fn unit_of_name(name: &str) -> (String, Option<Unit>) {
+    let (stem, suffix) = name.split_once(['_', '[', '(', ' ']).unwrap_or((name, ""));
+    let unit = match suffix.trim_matches(|c: char| !c.is_ascii_alphabetic()) {
+        "s" | "sec" | "seconds" => Some(Unit::Seconds),
+        "ms" | "milliseconds" => Some(Unit::Milliseconds),
+        "us" | "micros" | "microseconds" => Some(Unit::Microseconds),
+        "ns" | "nanoseconds" => Some(Unit::Nanoseconds),
+        _ => None,
+    };
+    (stem.trim().to_owned(), unit)
+}
+
+/// One column of the first rows as numbers.
+fn column(rows: &[Vec<&str>], index: usize) -> Vec<f64> {
+    rows.iter()
+        .map(|row| row.get(index).and_then(|field| field.parse().ok()).unwrap_or(f64::NAN))
+        .collect()
+}
+
+/// Columns t, x, y, p of a table of numbers, with the sentence that says so.
+pub fn order_from_numbers(rows: &[Vec<f64>]) -> ([usize; 4], String) {
+    let text: Vec<Vec<String>> =
+        rows.iter().map(|row| row.iter().map(f64::to_string).collect()).collect();
+    let rows: Vec<Vec<&str>> =
+        text.iter().map(|row| row.iter().map(String::as_str).collect()).collect();
+    let columns = columns_from_rows(&rows);
+    (columns, format!("columns {} from the first rows", order(columns)))
+}
+
 /// Columns t, x, y, p with the unit their name tells, or `None` when the line does not name all four.
 fn columns_from_names(line: &str) -> Option<Vec<(usize, Option<Unit>)>> {
     let names: Vec<String> = line
@@ -146,18 +187,6 @@ fn columns_from_names(line: &str) -> Option<Vec<(usize, Option<Unit>)>> {
         .map(|name| name.trim().trim_matches(['"', '\'']).to_ascii_lowercase())
         .filter(|name| !name.is_empty())
         .collect();
-    // "timestamp [us]" and "t_us" tell their unit behind the name.
-    let split = |name: &str| -> (String, Option<Unit>) {
-        let (stem, suffix) = name.split_once(['_', '[', '(', ' ']).unwrap_or((name, ""));
-        let unit = match suffix.trim_matches(|c: char| !c.is_ascii_alphabetic()) {
-            "s" | "sec" | "seconds" => Some(Unit::Seconds),
-            "ms" | "milliseconds" => Some(Unit::Milliseconds),
-            "us" | "micros" | "microseconds" => Some(Unit::Microseconds),
-            "ns" | "nanoseconds" => Some(Unit::Nanoseconds),
-            _ => None,
-        };
-        (stem.trim().to_owned(), unit)
-    };
     [
         &["t", "time", "timestamp", "timestamps", "ts"][..],
         &["x", "col", "column"],
@@ -167,7 +196,7 @@ fn columns_from_names(line: &str) -> Option<Vec<(usize, Option<Unit>)>> {
     .into_iter()
     .map(|wanted| {
         names.iter().enumerate().find_map(|(column, name)| {
-            let (stem, unit) = split(name);
+            let (stem, unit) = unit_of_name(name);
             wanted.contains(&stem.as_str()).then_some((column, unit))
         })
     })
@@ -202,17 +231,6 @@ fn columns_from_rows(rows: &[Vec<&str>]) -> [usize; 4] {
         .unwrap_or(0);
     others.retain(|&column| column != t);
     [t, others[0], others[1], p]
-}
-
-/// Seconds are told by fractions finer than a millisecond between events closer than one second.
-fn unit_from_rows(rows: &[Vec<&str>], column: usize) -> Unit {
-    let values: Vec<f64> = rows.iter().filter_map(|row| row.get(column)?.parse().ok()).collect();
-    let fractional = values.iter().any(|t| (t * 1e3).fract() != 0.0 && t.fract() != 0.0);
-    let step = match (values.first(), values.last()) {
-        (Some(first), Some(last)) => (last - first).abs() / values.len() as f64,
-        _ => 0.0,
-    };
-    if fractional && step < 1.0 { Unit::Seconds } else { Unit::Microseconds }
 }
 
 #[cfg(test)]

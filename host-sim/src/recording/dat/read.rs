@@ -3,6 +3,7 @@
 use evtach_core::{Event, Polarity};
 
 use super::{RECORD_BYTES, TYPE_CD, TYPE_EVENT_2D};
+use crate::recording::clock::Clock32;
 use crate::recording::error::RecordingError;
 use crate::recording::input::Input;
 use crate::recording::prophesee_header::Header;
@@ -10,8 +11,6 @@ use crate::recording::{Opened, Side, Source};
 
 /// Records decoded in one go.
 const CHUNK_RECORDS: usize = 16 * 1024;
-/// Time must fall by more than this for the 32-bit counter to have wrapped.
-const HALF_RANGE: u32 = 1 << 31;
 
 /// Whether the two bytes behind a `%` header are those of a DAT file with change events.
 pub(crate) fn is_dat(kind: &[u8]) -> bool {
@@ -31,7 +30,7 @@ pub(crate) fn open(mut input: Input, header: Header) -> Opened {
         Some(0 | 1) => Layout { x_bits: 9, y_bits: 8 },
         _ => Layout { x_bits: 14, y_bits: 14 },
     };
-    let source = Box::new(Dat { input, layout, last: 0, base_us: 0 });
+    let source = Box::new(Dat { input, layout, clock: Clock32::default() });
     Opened { format: "DAT", geometry, assumed, about: header.fields, source }
 }
 
@@ -44,8 +43,7 @@ struct Layout {
 struct Dat {
     input: Input,
     layout: Layout,
-    last: u32,
-    base_us: u64,
+    clock: Clock32,
 }
 
 impl Source for Dat {
@@ -70,14 +68,9 @@ impl Source for Dat {
         for &[t0, t1, t2, t3, a0, a1, a2, a3] in records {
             let t = u32::from_le_bytes([t0, t1, t2, t3]);
             let address = u32::from_le_bytes([a0, a1, a2, a3]);
-            if t < self.last && self.last - t > HALF_RANGE {
-                self.base_us += 1 << 32;
-                side.wraps += 1;
-            }
-            self.last = t;
             let on = (address >> (x_bits + y_bits)) & 1 == 1;
             events.push(Event {
-                t_us: self.base_us + u64::from(t),
+                t_us: self.clock.advance(t, &mut side.wraps),
                 x: (address & x_mask) as u16,
                 y: ((address >> x_bits) & y_mask) as u16,
                 polarity: if on { Polarity::On } else { Polarity::Off },

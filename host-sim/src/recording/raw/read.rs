@@ -1,7 +1,7 @@
 //! Reading RAW.
 
 use evtach_core::Event;
-use evtach_core::decode::{Evt2, Evt3};
+use evtach_core::decode::{Evt2, Evt3, Evt21};
 
 use crate::recording::error::RecordingError;
 use crate::recording::input::Input;
@@ -22,6 +22,10 @@ pub(crate) fn open(mut input: Input, header: Header) -> Result<Opened, Recording
     let (format, source): (_, Box<dyn Source>) = match encoding.as_str() {
         "EVT3" | "EVT3.0" => ("EVT3", Box::new(Words::new(input, Evt3::new()))),
         "EVT2" | "EVT2.0" => ("EVT2", Box::new(Words::new(input, Evt2::new()))),
+        "EVT21" | "EVT2.1" => {
+            let swapped = is_swapped(&mut input, &header)?;
+            ("EVT2.1", Box::new(Words::new(input, Evt21Bytes { decoder: Evt21::new(), swapped })))
+        }
         _ => {
             return Err(RecordingError::Unsupported {
                 what: format!("RAW encoding \"{encoding}\" is not read"),
@@ -74,6 +78,41 @@ impl Decoder for Evt3 {
         side.wraps = u64::from(self.wraps());
         side.untimed = self.untimed();
     }
+}
+
+/// EVT 2.1 with its byte order: sensors of the IMX636 generation send the upper half of a word first.
+struct Evt21Bytes {
+    decoder: Evt21,
+    swapped: bool,
+}
+
+impl Decoder for Evt21Bytes {
+    const WORD_BYTES: usize = 8;
+
+    fn decode(&mut self, words: &[u8], events: &mut Vec<Event>) {
+        let half = if self.swapped { 32 } else { 0 };
+        for word in words.as_chunks().0 {
+            let word = u64::from_le_bytes(*word).rotate_left(half);
+            self.decoder.decode(word, |event| events.push(event));
+        }
+    }
+
+    fn report(&self, side: &mut Side) {
+        side.wraps = u64::from(self.decoder.wraps());
+        side.untimed = self.decoder.untimed();
+    }
+}
+
+/// Whether the halves of EVT 2.1 words are swapped: as the header says, else as the first words make more sense.
+fn is_swapped(input: &mut Input, header: &Header) -> Result<bool, RecordingError> {
+    match header.format_option("endianness") {
+        Some("legacy") => return Ok(true),
+        Some(_) => return Ok(false),
+        None => {}
+    }
+    let words = input.peek(CHUNK_BYTES)?.as_chunks::<8>().0;
+    let time_words = |at: usize| words.iter().filter(|word| word[at] >> 4 == 0x8).count();
+    Ok(time_words(3) > time_words(7))
 }
 
 struct Words<D> {
