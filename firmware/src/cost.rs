@@ -108,7 +108,8 @@ impl<C> fmt::Display for Costs<C> {
         let StageCost { polls, ticks, longest } = self.push;
         writeln!(f, "push events={} calls={polls} ticks={ticks} longest={longest}", self.pushed)?;
         for (name, StageCost { polls, ticks, longest }) in &self.stages {
-            writeln!(f, "stage name={name} calls={polls} ticks={ticks} longest={longest}")?;
+            // The name stands last, because it may hold spaces.
+            writeln!(f, "stage calls={polls} ticks={ticks} longest={longest} name={name}")?;
         }
         Ok(())
     }

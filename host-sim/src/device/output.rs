@@ -111,7 +111,7 @@ impl Reader {
                 poll_ticks: number(line, "poll")?,
             }),
             "push" => self.push = Some((number(line, "events")?, call_cost(line, "push")?)),
-            "stage" => self.stages.push(call_cost(line, field(line, "name")?)?),
+            "stage" => self.stages.push(call_cost(line, line.split_once(" name=")?.1)?),
             "memory" => self.memory = Some(memory(line)?),
             _ => return None,
         }
@@ -152,7 +152,7 @@ reading t_us=5 window_us=10 events=3 thinned=0 lost=0 status=locked
 rotor id=0 x_px=3f800000
 spent push=7 poll=9
 push events=3 calls=1 ticks=7 longest=7
-stage name=scan calls=2 ticks=9 longest=5
+stage calls=2 ticks=9 longest=5 name=fine scan
 memory tachometer=1 store=2 heat=3 blocks=4 stack=5
 ";
 
@@ -165,7 +165,10 @@ memory tachometer=1 store=2 heat=3 blocks=4 stack=5
         assert_eq!(reading.field("status"), Some("locked"));
         assert_eq!((reading.push_ticks, reading.poll_ticks), (7, 9));
         assert_eq!((output.events, output.push.ticks), (3, 7));
-        assert_eq!((output.stages[0].name.as_str(), output.stages[0].longest_ticks), ("scan", 5));
+        assert_eq!(
+            (output.stages[0].name.as_str(), output.stages[0].longest_ticks),
+            ("fine scan", 5)
+        );
         assert_eq!(output.memory.stack_bytes, 5);
     }
 
