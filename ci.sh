@@ -24,14 +24,15 @@ step_install() {
   cargo --version
   rustup target list --installed | grep -qx "$target" || rustup target add "$target"
 
-  if ! command -v qemu-system-arm >/dev/null; then
-    if command -v apt-get >/dev/null; then
-      as_root apt-get update -q
-      as_root env DEBIAN_FRONTEND=noninteractive apt-get install -yq --no-install-recommends qemu-system-arm
-    else
-      echo "No apt-get here: install qemu-system-arm by hand. Until then the tests on the emulated board are skipped."
-    fi
+  if ! command -v qemu-system-arm >/dev/null && ! install_qemu; then
+    echo "qemu-system-arm could not be installed: do it by hand. Until then the tests on the emulated board are skipped."
   fi
+}
+
+install_qemu() {
+  command -v apt-get >/dev/null || return 1
+  as_root apt-get update -q &&
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -yq --no-install-recommends qemu-system-arm
 }
 
 step_format() {
