@@ -1,2 +1,12 @@
-//! The portable part of the handheld tachometer.
+//! The portable part of the handheld tachometer: what runs on every board, and on a PC under test.
+//!
+//! Data flows one way: a source of bytes, [`record`]s, [`intake`] (which never waits for a
+//! measurement), [`measure`], and a [`report`] line for each reading. A board under `board/` names pins,
+//! peripherals and interrupts, and nothing else.
 #![no_std]
+
+pub mod cost;
+pub mod intake;
+pub mod measure;
+pub mod record;
+pub mod report;

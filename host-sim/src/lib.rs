@@ -1,5 +1,6 @@
 //! Recordings, synthesiser and reports around `evtach-core`.
 
+pub mod device;
 pub mod measure;
 pub mod recording;
 pub mod synth;

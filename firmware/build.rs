@@ -1,0 +1,20 @@
+//! Gives the linker the memory map at the root of the repository.
+
+use std::path::PathBuf;
+use std::{env, fs};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rerun-if-changed=../memory.x");
+    if env::var("CARGO_CFG_TARGET_OS")? == "none" {
+        // A copy, because the linker finds the original from some folders only, and cargo would
+        // not link again after it has been edited.
+        let out = PathBuf::from(env::var("OUT_DIR")?);
+        fs::copy("../memory.x", out.join("memory.x"))?;
+        println!("cargo:rustc-link-search={}", out.display());
+        println!("cargo:rustc-link-arg-bins=-Tlink.x");
+        // Flash does not begin at a page boundary.
+        println!("cargo:rustc-link-arg-bins=--nmagic");
+    }
+    Ok(())
+}

@@ -1,0 +1,20 @@
+//! The tachometer on QEMU's mps2-an500: events from a file of the host, readings to its console.
+//!
+//! `cargo q -- FILE [sensor]` plays a recording of [`evtach_firmware::record`]s, as fast as it is
+//! measured, or with `sensor` as fast as it was recorded. Exit code 0: a speed was read; 1: none was;
+//! 2: bad usage or input; 101: panic; 102: fault.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(target_os = "none")]
+mod console;
+#[cfg(target_os = "none")]
+mod device;
+#[cfg(target_os = "none")]
+mod stack;
+#[cfg(target_os = "none")]
+mod timers;
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    println!("This is a program for an emulated board. `cargo q -- FILE` runs it in QEMU.");
+}

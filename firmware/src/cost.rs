@@ -1,0 +1,120 @@
+//! What the measurement costs, stage by stage, counted where it runs.
+
+use core::fmt;
+
+use evtach_core::{Event, Poll, Tachometer};
+use heapless::LinearMap;
+
+/// A counter of time or of instructions.
+pub trait Clock {
+    /// Ticks since some moment; what a tick is, the board says.
+    fn ticks(&self) -> u64;
+}
+
+/// A PC does not count.
+impl Clock for () {
+    fn ticks(&self) -> u64 {
+        0
+    }
+}
+
+/// Ticks spent between two readings.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Spent {
+    /// Taking in events.
+    pub push: u64,
+    /// Measuring.
+    pub poll: u64,
+}
+
+/// What one stage of the measurement has cost so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct StageCost {
+    /// Pieces of the measurement.
+    pub polls: u64,
+    /// Ticks in all of them.
+    pub ticks: u64,
+    /// Ticks in the longest.
+    pub longest: u64,
+}
+
+impl StageCost {
+    fn add(&mut self, ticks: u64) {
+        self.polls += 1;
+        self.ticks += ticks;
+        self.longest = self.longest.max(ticks);
+    }
+}
+
+/// Stages told apart.
+const STAGES: usize = 16;
+
+/// Costs counted around the calls into the tachometer.
+#[derive(Debug)]
+pub struct Costs<C> {
+    clock: C,
+    stages: LinearMap<&'static str, StageCost, STAGES>,
+    pushed: u64,
+    push: StageCost,
+    spent: Spent,
+}
+
+impl<C: Clock> Costs<C> {
+    /// Nothing spent yet.
+    pub const fn new(clock: C) -> Self {
+        let none = StageCost { polls: 0, ticks: 0, longest: 0 };
+        let spent = Spent { push: 0, poll: 0 };
+        Self { clock, stages: LinearMap::new(), pushed: 0, push: none, spent }
+    }
+
+    /// Pushes events.
+    pub fn push(&mut self, tachometer: &mut Tachometer<'_>, events: &[Event]) {
+        let start = self.clock.ticks();
+        tachometer.push(events);
+        let ticks = self.clock.ticks() - start;
+        self.push.add(ticks);
+        self.pushed += events.len() as u64;
+        self.spent.push += ticks;
+    }
+
+    /// Polls once.
+    pub fn poll(&mut self, tachometer: &mut Tachometer<'_>, budget: u32) -> Poll {
+        let stage = stage(tachometer);
+        let start = self.clock.ticks();
+        let poll = tachometer.poll(budget);
+        let ticks = self.clock.ticks() - start;
+        if self.stages.get(&stage).is_none() {
+            // With more names than places the rest goes uncounted by stage; the sum still holds.
+            self.stages.insert(stage, StageCost::default()).ok();
+        }
+        if let Some(cost) = self.stages.get_mut(&stage) {
+            cost.add(ticks);
+        }
+        self.spent.poll += ticks;
+        poll
+    }
+
+    /// What was spent since this was last asked.
+    pub fn take_spent(&mut self) -> Spent {
+        core::mem::take(&mut self.spent)
+    }
+}
+
+/// One line for intake, one for each stage.
+impl<C> fmt::Display for Costs<C> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let StageCost { polls, ticks, longest } = self.push;
+        writeln!(f, "push events={} calls={polls} ticks={ticks} longest={longest}", self.pushed)?;
+        for (name, StageCost { polls, ticks, longest }) in &self.stages {
+            // The name stands last, because it may hold spaces.
+            writeln!(f, "stage calls={polls} ticks={ticks} longest={longest} name={name}")?;
+        }
+        Ok(())
+    }
+}
+
+fn stage(_tachometer: &Tachometer<'_>) -> &'static str {
+    "all"
+}

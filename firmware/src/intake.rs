@@ -1,0 +1,143 @@
+//! Taking in events: from a source of records to blocks of events, and never late.
+
+use core::mem;
+
+use embassy_sync::blocking_mutex::raw::RawMutex;
+use embassy_sync::zerocopy_channel::Sender;
+use embassy_time::{Duration, Instant, Timer};
+use evtach_core::Event;
+use heapless::Vec;
+
+use crate::record::{Decoder, Header, HeaderError, RECORD_BYTES};
+
+/// Events in one block: 128 x 16 B = 2 KiB; at 1 Mev/s a block fills in 128 us.
+pub const BLOCK_EVENTS: usize = 128;
+
+/// Blocks between taking in and measuring: 8 x 2 KiB = 16 KiB, 1 ms at 1 Mev/s.
+pub const BLOCKS: usize = 8;
+
+/// Events on their way from intake to measurement.
+#[derive(Clone, Debug)]
+pub struct Block {
+    /// Events in the order in which they came.
+    pub events: Vec<Event, BLOCK_EVENTS>,
+    /// Events lost before these, because every block was taken.
+    pub lost: u64,
+    /// Whether this is the last block.
+    pub last: bool,
+}
+
+impl Block {
+    /// A block without events.
+    pub const EMPTY: Self = Self { events: Vec::new(), lost: 0, last: false };
+}
+
+/// How fast a recording plays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Pace {
+    /// As fast as it is measured: a file can wait, so nothing is lost.
+    File,
+    /// As fast as it was recorded: a sensor does not wait, and what finds no free block is lost.
+    Sensor,
+}
+
+/// A stream of bytes: a file, or a link to a sensor.
+pub trait Source {
+    /// What can go wrong with it.
+    type Error;
+
+    /// Fills `bytes` from the start and returns how many it filled; fewer than asked for only at the end.
+    ///
+    /// # Errors
+    ///
+    /// Whatever the source reports.
+    fn read(&mut self, bytes: &mut [u8]) -> impl Future<Output = Result<usize, Self::Error>>;
+}
+
+/// Why taking in ended early.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum IntakeError<E> {
+    /// The source failed.
+    #[error("the source of events failed")]
+    Source(E),
+    /// The recording does not begin as one.
+    #[error(transparent)]
+    Header(#[from] HeaderError),
+    /// The recording ends before its header says so.
+    #[error("the recording ends after {events} of {expected} events: write it again")]
+    Truncated {
+        /// Complete records that were read.
+        events: u32,
+        /// Records the header speaks of.
+        expected: u32,
+    },
+}
+
+/// Reads the header of a recording.
+///
+/// # Errors
+///
+/// When the source fails, or does not begin with a header.
+pub async fn open<S: Source>(source: &mut S) -> Result<Header, IntakeError<S::Error>> {
+    let mut bytes = [0; Header::BYTES];
+    source.read(&mut bytes).await.map_err(IntakeError::Source)?;
+    Ok(Header::parse(&bytes)?)
+}
+
+/// Takes in every record that follows the header, and closes with a block marked last.
+///
+/// # Errors
+///
+/// When the source fails or ends early; blocks filled so far have been sent.
+pub async fn take_in<S: Source, M: RawMutex>(
+    source: &mut S,
+    header: &Header,
+    pace: Pace,
+    blocks: &mut Sender<'_, M, Block>,
+) -> Result<(), IntakeError<S::Error>> {
+    let start = Instant::now();
+    let mut decoder = Decoder::new(header.first_us);
+    let mut bytes = [0; BLOCK_EVENTS * RECORD_BYTES];
+    let mut events = Vec::new();
+    let mut lost = 0;
+    let mut taken = 0;
+    while taken < header.events {
+        let wanted = (header.events - taken).min(BLOCK_EVENTS as u32) as usize * RECORD_BYTES;
+        let read = source.read(&mut bytes[..wanted]).await.map_err(IntakeError::Source)?;
+        let (records, _) = bytes[..read].as_chunks::<RECORD_BYTES>();
+        taken += records.len() as u32;
+        if read < wanted {
+            return Err(IntakeError::Truncated { events: taken, expected: header.events });
+        }
+        events.clear();
+        events.extend(records.iter().map(|&record| decoder.decode(record)));
+        if pace == Pace::Sensor {
+            let age_us =
+                events.last().map_or(0, |e: &Event| e.t_us.saturating_sub(header.first_us));
+            Timer::at(start + Duration::from_micros(age_us)).await;
+        }
+        let slot = match pace {
+            Pace::File => Some(blocks.send().await),
+            Pace::Sensor => blocks.try_send(),
+        };
+        if let Some(slot) = slot {
+            mem::swap(&mut slot.events, &mut events);
+            slot.lost = mem::take(&mut lost);
+            slot.last = false;
+            blocks.send_done();
+        } else {
+            lost += events.len() as u64;
+        }
+    }
+    let slot = blocks.send().await;
+    slot.events.clear();
+    slot.lost = lost;
+    slot.last = true;
+    blocks.send_done();
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

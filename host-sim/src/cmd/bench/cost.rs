@@ -1,0 +1,199 @@
+//! `evtach bench cost`: what measuring costs on the device.
+//!
+//! Builds the firmware, plays recordings to it in QEMU (`-icount shift=0`, where the board's timers count
+//! instructions), and prints instructions per event taken in, per stage and per reading, and bytes of
+//! flash and RAM. Instructions are not cycles: a Cortex-M7 may do two in one cycle, or wait for its memory.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::Context as _;
+use evtach_core::{Event, Geometry};
+use evtach_host::device::{self, CallCost, INSTRUCTIONS_PER_TICK, Image, MemoryUse, Output, Pace};
+use evtach_host::recording::{self, OpenOptions};
+use evtach_host::synth::{self, Rotor, Scene};
+
+/// Arguments of `evtach bench cost`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Recordings to play; without any, a three-bladed fan and a two-bladed propeller are made up.
+    files: Vec<PathBuf>,
+    /// Also write the recording as the device reads it, for `cargo q -- OUT`.
+    #[arg(long, value_name = "OUT")]
+    keep: Option<PathBuf>,
+}
+
+/// A recording in memory.
+struct Played {
+    name: String,
+    geometry: Geometry,
+    events: Vec<Event>,
+}
+
+/// Runs the subcommand.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    eprintln!("building the firmware");
+    let image = device::build()?;
+    let mut memory = None;
+    for played in recordings(&args.files)? {
+        if let Some(path) = &args.keep {
+            device::write_recording(path, played.geometry, &played.events)?;
+        }
+        eprintln!("playing {} in QEMU", played.name);
+        let output = device::run(&image, played.geometry, &played.events, Pace::File)?;
+        print_run(&played, &output);
+        let live = device::run(&image, played.geometry, &played.events, Pace::Sensor)?;
+        print_live(&live);
+        memory = Some(output.memory);
+    }
+    if let Some(memory) = memory {
+        print_bytes(&image, &memory);
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn recordings(files: &[PathBuf]) -> anyhow::Result<Vec<Played>> {
+    if files.is_empty() { made_up() } else { files.iter().map(|path| load(path)).collect() }
+}
+
+fn load(path: &Path) -> anyhow::Result<Played> {
+    let name = path.display().to_string();
+    let mut recording =
+        recording::open(path, &OpenOptions::default()).with_context(|| name.clone())?;
+    let mut events = Vec::new();
+    while recording.read_chunk(&mut events).with_context(|| name.clone())? {}
+    Ok(Played { name, geometry: recording.geometry, events })
+}
+
+/// Half a second each of a fan and a propeller in front of a DAVIS346.
+fn made_up() -> anyhow::Result<Vec<Played>> {
+    [("three-bladed fan, 1500 rpm", 3, 1500.0), ("two-bladed propeller, 6000 rpm", 2, -6000.0)]
+        .into_iter()
+        .map(|(name, blades, rpm)| {
+            let rotor = Rotor { blades, rpm, ..Rotor::default() };
+            let scene = Scene { duration_ms: 500.0, rotors: vec![rotor], ..Scene::default() };
+            let geometry = Geometry::new(scene.width_px, scene.height_px)
+                .context("the scene's sensor is out of range")?;
+            let events = synth::generate(&scene)?.events;
+            Ok(Played { name: name.to_owned(), geometry, events })
+        })
+        .collect()
+}
+
+fn print_run(played: &Played, output: &Output) {
+    let duration_s = duration_s(&played.events);
+    println!(
+        "{}: {}x{}, {duration_s:.3} s, {} events",
+        played.name,
+        played.geometry.width_px,
+        played.geometry.height_px,
+        grouped(output.events)
+    );
+    let per_event = instructions(output.push.ticks) as f64 / output.events.max(1) as f64;
+    println!("  {:<24}{per_event:>16.1} instructions", "taking in one event");
+    println!("  {:<24}{:>16}{:>12}{:>16}", "stage", "instructions", "calls", "longest call");
+    for CallCost { name, calls, ticks, longest_ticks } in &output.stages {
+        println!(
+            "  {name:<24}{:>16}{:>12}{:>16}",
+            grouped(instructions(*ticks)),
+            grouped(*calls),
+            grouped(instructions(*longest_ticks))
+        );
+    }
+    print_readings(output);
+    let all = instructions(output.push.ticks + output.stages.iter().map(|s| s.ticks).sum::<u64>());
+    println!(
+        "  {:<24}{:>16.1} million instructions per second of recording",
+        "in all",
+        all as f64 / duration_s / 1e6
+    );
+}
+
+/// What the first reading with a speed costs, and each after the first locked one.
+fn print_readings(output: &Output) {
+    let is = |index: usize, statuses: &[&str]| {
+        output.readings[index].field("status").is_some_and(|status| statuses.contains(&status))
+    };
+    let mut indices = 0..output.readings.len();
+    let Some(first) = indices.clone().find(|&i| is(i, &["coarse", "locked"])) else {
+        return println!("  no reading among {}", output.readings.len());
+    };
+    let ticks = |range: &[device::DeviceReading]| range.iter().map(|r| r.poll_ticks).sum::<u64>();
+    println!(
+        "  {:<24}{:>16} instructions of measuring",
+        "first reading",
+        grouped(instructions(ticks(&output.readings[..=first])))
+    );
+    let Some(locked) = indices.find(|&i| is(i, &["locked"])) else {
+        return println!("  never locked");
+    };
+    let later = &output.readings[locked + 1..];
+    if !later.is_empty() {
+        println!(
+            "  {:<24}{:>16} instructions, mean of {}",
+            "reading after lock",
+            grouped(instructions(ticks(later)) / later.len() as u64),
+            later.len()
+        );
+    }
+}
+
+fn print_live(live: &Output) {
+    let lost: u64 = live.readings.iter().filter_map(|r| r.field("lost")?.parse::<u64>().ok()).sum();
+    println!(
+        "  {:<24}{:>16} events, {} readings, at 250 million instructions per second",
+        "played live: lost",
+        grouped(lost),
+        live.readings.len()
+    );
+    println!();
+}
+
+fn print_bytes(image: &Image, memory: &MemoryUse) {
+    println!("bytes on the device");
+    for (name, bytes) in [
+        ("flash", image.flash_bytes),
+        ("variables in RAM", image.ram_bytes),
+        ("  tachometer", memory.tachometer_bytes),
+        ("  heat map", memory.heat_bytes),
+        ("  event store", memory.store_bytes),
+        ("  blocks of events", memory.blocks_bytes),
+        ("deepest stack", memory.stack_bytes),
+    ] {
+        println!("  {name:<24}{:>16}", grouped(bytes));
+    }
+}
+
+fn instructions(ticks: u64) -> u64 {
+    ticks * INSTRUCTIONS_PER_TICK
+}
+
+fn duration_s(events: &[Event]) -> f64 {
+    match (events.first(), events.last()) {
+        (Some(first), Some(last)) => last.t_us.saturating_sub(first.t_us).max(1) as f64 * 1e-6,
+        _ => 1e-6,
+    }
+}
+
+/// Digits in groups of three.
+fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            text.push(' ');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_from_the_right() {
+        assert_eq!([0, 999, 1_000, 12_345_678].map(grouped), ["0", "999", "1 000", "12 345 678"]);
+    }
+}

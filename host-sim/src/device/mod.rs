@@ -1,0 +1,70 @@
+//! The firmware in QEMU: its image, and what it says to a recording.
+
+mod image;
+mod output;
+mod run;
+
+use std::path::PathBuf;
+
+pub use image::{Image, build};
+pub use output::{CallCost, DeviceReading, MemoryUse, Output};
+pub use run::{Pace, qemu_present, run, write_recording};
+
+/// Instructions in one tick of the board's 25 MHz timers, at QEMU's `-icount shift=0`.
+pub const INSTRUCTIONS_PER_TICK: u64 = 40;
+
+/// Why the device gave no answer.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DeviceError {
+    /// A program could not be started.
+    #[error("cannot start {program}: {source}; `./ci.sh install` installs what is missing")]
+    Start {
+        /// The program.
+        program: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The firmware does not build.
+    #[error("the firmware does not build: run `cargo fw` in {} to see why", .0.display())]
+    Build(PathBuf),
+    /// The image is not what the linker should have written.
+    #[error("{}: {source}; run `cargo fw` to build it anew", .path.display())]
+    Image {
+        /// The image.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: object::Error,
+    },
+    /// A file could not be read or written.
+    #[error("{}: {source}; see that there is room and permission", .path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// More events than the header of a recording for the device can count.
+    #[error(
+        "{0} events are more than a recording for the device can hold: cut it with --start and --end"
+    )]
+    TooManyEvents(usize),
+    /// The firmware stopped on its own.
+    #[error("the firmware ended with code {code}: {message}")]
+    Failed {
+        /// Exit code: 2 bad input, 101 panic, 102 fault.
+        code: i32,
+        /// What it said.
+        message: String,
+    },
+    /// The firmware said something that nobody expects.
+    #[error(
+        "the firmware's line {line} is not understood: \"{text}\"; image and program differ, build both"
+    )]
+    Line {
+        /// Line, counted from 1.
+        line: usize,
+        /// The line.
+        text: String,
+    },
+}

@@ -1,0 +1,137 @@
+//! The device and the PC give the same readings for the same events, to the last bit.
+
+use std::env;
+use std::path::{Path, PathBuf};
+
+use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
+use evtach_core::{
+    Event, Geometry, Memory, Poll, Reading, Settings, Speed, StoredEvent, Tachometer,
+};
+use evtach_firmware::report::Lines;
+use evtach_host::device::{self, Pace};
+use evtach_host::recording::{self, OpenOptions};
+use evtach_host::synth::scene::Lamp;
+use evtach_host::synth::{self, Rotor, Scene};
+
+/// Plays events to the core here, in the device's capacities but in another rhythm: pieces of other
+/// sizes, and as many measuring steps at once as will go.
+fn readings_on_pc(geometry: Geometry, events: &[Event]) -> Vec<Reading> {
+    let mut store = vec![StoredEvent::default(); DEVICE_EVENTS];
+    let mut heat = vec![0; DEVICE_HEAT_CELLS];
+    let memory = Memory { events: &mut store, heat: &mut heat };
+    let mut tachometer = Tachometer::new(Settings::new(geometry), memory);
+    let mut readings = Vec::new();
+    let mut drain = |tachometer: &mut Tachometer<'_>| {
+        loop {
+            match tachometer.poll(u32::MAX) {
+                Poll::Idle => break,
+                Poll::Pending => {}
+                Poll::Ready(reading) => readings.push(reading),
+            }
+        }
+    };
+    for piece in events.chunks(77) {
+        tachometer.push(piece);
+        drain(&mut tachometer);
+    }
+    tachometer.finish();
+    drain(&mut tachometer);
+    readings
+}
+
+/// Compares the two line by line and returns the readings; `None` without QEMU.
+fn compare(name: &str, geometry: Geometry, events: &[Event]) -> Option<Vec<Reading>> {
+    if !device::qemu_present() {
+        assert!(env::var_os("CI").is_none(), "no qemu-system-arm: ./ci.sh install installs it");
+        println!("skipped: qemu-system-arm is not installed; ./ci.sh install installs it");
+        return None;
+    }
+    let image = device::build().expect("the firmware builds");
+    let output = device::run(&image, geometry, events, Pace::File).expect("the firmware runs");
+    let readings = readings_on_pc(geometry, events);
+    assert!(!readings.is_empty(), "{name}: {} events and no reading", events.len());
+    for (index, (here, there)) in readings.iter().zip(&output.readings).enumerate() {
+        let here = Lines(here).to_string();
+        for (here, there) in here.lines().zip(there.lines.lines()) {
+            assert_eq!(here, there, "{name}: reading {index}: PC on the left, device on the right");
+        }
+        assert_eq!(here.lines().count(), there.lines.lines().count(), "{name}: reading {index}");
+    }
+    assert_eq!(readings.len(), output.readings.len(), "{name}: number of readings");
+    let lines: usize = readings.iter().map(|reading| 1 + reading.rotors.len()).sum();
+    println!("{name}: {} readings, {lines} lines equal", readings.len());
+    Some(readings)
+}
+
+/// A scene in front of a DAVIS346.
+fn synthesise(scene: &Scene) -> (Geometry, Vec<Event>) {
+    let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
+    (geometry, synth::generate(scene).expect("a scene in range").events)
+}
+
+/// Every speed lies within 1 % of the truth and there is one: equal bits of nonsense would prove nothing.
+fn assert_speed(readings: &[Reading], rpm: f32) {
+    let speeds: Vec<f32> = readings
+        .iter()
+        .flat_map(|reading| &reading.rotors)
+        .filter_map(|rotor| rotor.speed)
+        .map(|speed| speed.omega_rad_s * Speed::RPM_PER_RAD_S)
+        .collect();
+    assert!(!speeds.is_empty(), "no speed");
+    for speed in speeds {
+        assert!((speed / rpm - 1.0).abs() < 0.01, "{speed} rpm instead of {rpm}");
+    }
+}
+
+#[test]
+fn slow_fan() {
+    let rotor = Rotor { blades: 3, rpm: 1200.0, ..Rotor::default() };
+    let scene = Scene { duration_ms: 400.0, rotors: vec![rotor], ..Scene::default() };
+    let (geometry, events) = synthesise(&scene);
+    if let Some(readings) = compare("slow fan", geometry, &events) {
+        assert_speed(&readings, 1200.0);
+    }
+}
+
+#[test]
+fn fast_propeller() {
+    let rotor = Rotor { blades: 2, rpm: -9000.0, ..Rotor::default() };
+    let scene = Scene { rotors: vec![rotor], ..Scene::default() };
+    let (geometry, events) = synthesise(&scene);
+    if let Some(readings) = compare("fast propeller", geometry, &events) {
+        assert_speed(&readings, -9000.0);
+    }
+}
+
+#[test]
+fn flicker_is_refused_alike() {
+    // A patch of wall that a lamp shines on: the whole sensor would give 44 Mev/s.
+    let lamp = Lamp { spot_px: Some([173.0, 130.0, 30.0]), ..Lamp::default() };
+    let scene = Scene { rotors: Vec::new(), lamp: Some(lamp), ..Scene::default() };
+    let (geometry, events) = synthesise(&scene);
+    if let Some(readings) = compare("lamp", geometry, &events) {
+        assert!(readings.iter().all(|reading| reading.status.reason().is_some()), "{readings:?}");
+    }
+}
+
+#[test]
+fn real_recordings() {
+    let folder = env::var_os("EVTACH_RECORDINGS")
+        .map_or_else(
+            || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/recordings"),
+            PathBuf::from,
+        )
+        .join("real");
+    for name in ["spinning-dot.evt2.raw", "person.aedat4", "lamp-100hz.davis346.aedat4"] {
+        let path = folder.join(name);
+        if !path.exists() {
+            println!("skipped: no recordings ({})", path.display());
+            continue;
+        }
+        let mut recording =
+            recording::open(&path, &OpenOptions::default()).expect("a known recording");
+        let mut events = Vec::new();
+        while recording.read_chunk(&mut events).expect("an undamaged recording") {}
+        compare(name, recording.geometry, &events);
+    }
+}
