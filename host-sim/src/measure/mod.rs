@@ -13,7 +13,7 @@ pub use summary::{Summary, summarise};
 pub use table::{evidence, table};
 
 /// How much memory the tachometer is lent: the only difference between device and PC.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum Capacity {
     /// What the handheld device has.
     Device,
@@ -22,6 +22,18 @@ pub enum Capacity {
 }
 
 impl Capacity {
+    /// Both, the larger first.
+    pub const ALL: [Self; 2] = [Self::Full, Self::Device];
+
+    /// The name used in tables.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Full => "full",
+            Self::Device => "device",
+        }
+    }
+
     /// Events in the store.
     #[must_use]
     pub const fn events(self) -> usize {

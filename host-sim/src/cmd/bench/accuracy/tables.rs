@@ -1,0 +1,160 @@
+//! The tables of the accuracy benchmark.
+
+use evtach_host::synth::Model;
+
+use super::super::drive::Capacity;
+use super::super::report::{Table, short};
+use super::super::spec::{BLADES, DISTANCES_CM, Mount};
+use super::cells::{Cells, Key, ModelKey, Place, Stage, Window};
+
+/// One column: its head, and where its value comes from.
+type Column = (&'static str, Window, bool, Stage);
+/// One row: its name, and the places it averages over.
+type Row = (String, Vec<Place>);
+
+const STAGES: [Column; 9] = [
+    ("initial", Window::Paper, false, Stage::Initial),
+    ("refined", Window::Paper, false, Stage::Refined),
+    ("further", Window::Paper, false, Stage::Further),
+    ("lock", Window::Paper, false, Stage::Lock),
+    ("reading 150 ms", Window::Paper, false, Stage::Reading),
+    ("bound", Window::Paper, false, Stage::Bound),
+    ("reading", Window::Adaptive, false, Stage::Reading),
+    ("own", Window::Adaptive, false, Stage::Own),
+    ("bound", Window::Adaptive, false, Stage::Bound),
+];
+
+const HANDHELD: [Column; 10] = [
+    ("initial", Window::Paper, false, Stage::Initial),
+    ("refined", Window::Paper, false, Stage::Refined),
+    ("further", Window::Paper, false, Stage::Further),
+    ("lock", Window::Paper, false, Stage::Lock),
+    ("reading 150 ms", Window::Paper, false, Stage::Reading),
+    ("reading", Window::Adaptive, false, Stage::Reading),
+    ("bound", Window::Adaptive, false, Stage::Bound),
+    ("room", Window::Adaptive, false, Stage::Room),
+    ("room, gyro", Window::Adaptive, true, Stage::Room),
+    ("roll", Window::Adaptive, false, Stage::Roll),
+];
+
+/// All tables: one of each kind for each event model and capacity.
+pub fn tables(cells: &Cells, models: &[Model], seeds: u64) -> Vec<Table> {
+    let mut tables = Vec::new();
+    for &model in models {
+        for capacity in Capacity::ALL {
+            let view = View { cells, model: model.into(), capacity, seeds };
+            tables.extend(view.tables());
+        }
+    }
+    tables
+}
+
+struct View<'a> {
+    cells: &'a Cells,
+    model: ModelKey,
+    capacity: Capacity,
+    seeds: u64,
+}
+
+impl View<'_> {
+    fn tables(&self) -> Vec<Table> {
+        let mut tables = vec![
+            self.table("fixed camera", &STAGES, &self.speeds(Mount::Fixed)),
+            self.table(
+                "handheld, before a textured wall",
+                &HANDHELD,
+                &self.speeds(Mount::Handheld),
+            ),
+            self.table("vibrating host", &STAGES, &self.speeds(Mount::Vibrating)),
+        ];
+        let distances: Vec<u32> = DISTANCES_CM.iter().map(|d| *d as u32).collect();
+        for mount in [Mount::Fixed, Mount::Handheld] {
+            let row = |cm: &u32| (format!("{cm} cm"), self.averaged(mount, 3, *cm));
+            let rows: Vec<Row> = distances.iter().map(row).collect();
+            if rows.iter().all(|(_, places)| !places.is_empty()) {
+                let title = format!("distance, {}, mean over the speeds", mount.as_str());
+                let columns: &[Column] = if mount == Mount::Fixed { &STAGES } else { &HANDHELD };
+                tables.push(self.table(&title, columns, &rows));
+            }
+        }
+        let row = |n: &u8| (format!("{n} blades"), self.averaged(Mount::Fixed, *n, 40));
+        let rows: Vec<Row> = BLADES.iter().map(row).collect();
+        if rows.iter().all(|(_, places)| !places.is_empty()) {
+            tables.push(self.table("blades, fixed, mean over the speeds", &STAGES, &rows));
+        }
+        tables.push(self.table("four rotors", &STAGES, &[("drone".to_owned(), vec![Place::Quad])]));
+        tables
+    }
+
+    /// A row for each speed that was measured, and their mean.
+    fn speeds(&self, mount: Mount) -> Vec<Row> {
+        let all = self.averaged(mount, 3, 40);
+        let one = |place: &Place| match place {
+            Place::One { rpm, .. } => (format!("{rpm} rpm"), vec![*place]),
+            Place::Quad => ("drone".to_owned(), vec![*place]),
+        };
+        let mut rows: Vec<Row> = all.iter().map(one).collect();
+        rows.push(("mean".to_owned(), all));
+        rows
+    }
+
+    /// The places of all speeds under the same conditions.
+    fn averaged(&self, mount: Mount, blades: u8, distance_cm: u32) -> Vec<Place> {
+        let wanted = |place: &Place| {
+            matches!(place, Place::One { blades: b, distance_cm: d, mount: m, .. }
+                if (*b, *d, *m) == (blades, distance_cm, mount))
+        };
+        self.cells.places().into_iter().filter(wanted).collect()
+    }
+
+    fn key(&self, place: Place, window: Window, gyro: bool) -> Key {
+        Key { place, model: self.model, capacity: self.capacity, window, gyro }
+    }
+
+    /// Mean over the places, `None` where any of them has no value.
+    fn mean(&self, places: &[Place], (_, window, gyro, stage): &Column) -> Option<f64> {
+        let sum = |p: &Place| self.cells.get(&self.key(*p, *window, *gyro), *stage)?.mean();
+        let values = places.iter().map(sum).collect::<Option<Vec<f64>>>()?;
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    }
+
+    fn table(&self, title: &str, columns: &[Column], rows: &[Row]) -> Table {
+        let mut notes = vec![
+            "RMAE in permille; bound: sqrt(12) jitter / (window sqrt(rotor events)); own: clock error taken out"
+                .to_owned(),
+        ];
+        let mut heads = vec![String::new()];
+        heads.extend(columns.iter().map(|c| c.0.to_owned()));
+        heads.extend(["x bound".to_owned(), "no reading".to_owned()]);
+        let own = ("", Window::Adaptive, false, Stage::Own);
+        let bound = ("", Window::Adaptive, false, Stage::Bound);
+        let mut far = Vec::new();
+        let cells = rows.iter().map(|(name, places)| {
+            let mut cells = vec![name.clone()];
+            let value = |c: &Column| self.mean(places, c).map_or_else(|| "-".to_owned(), short);
+            cells.extend(columns.iter().map(value));
+            let times = self.mean(places, &own).zip(self.mean(places, &bound)).map(|(o, b)| o / b);
+            if times.is_some_and(|times| times > 3.0) {
+                far.push(name.clone());
+            }
+            cells.push(times.map_or_else(|| "-".to_owned(), |t| format!("{t:.1}")));
+            let missing = |p: &Place| {
+                let key = self.key(*p, Window::Adaptive, false);
+                self.cells.get(&key, Stage::Reading).map_or(0, |s| s.missing())
+            };
+            cells.push(places.iter().map(missing).sum::<u32>().to_string());
+            cells
+        });
+        let cells: Vec<Vec<String>> = cells.collect();
+        if !far.is_empty() {
+            notes.push(format!("more than 3 times the bound: {}", far.join(", ")));
+        }
+        let title = format!(
+            "{title} [{} model, {} memory, {} seeds]",
+            self.model.as_str(),
+            self.capacity.as_str(),
+            self.seeds
+        );
+        Table { title, notes, columns: heads, rows: cells }
+    }
+}

@@ -1,0 +1,223 @@
+//! `evtach bench trust`: can a reading be relied on?
+//!
+//! Random scenes, a fifth of them without any rotor ([`scenes`] says which). Every reading of every recording is compared
+//! with the room's truth of its own window. Results go to a file line by line, so that a long run may be stopped and
+//! taken up again.
+
+mod scenes;
+mod tally;
+
+use std::collections::BTreeSet;
+use std::fs::OpenOptions;
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+use anyhow::{Context as _, bail};
+use evtach_core::{Geometry, Reading, Settings};
+use evtach_host::synth::{Motion, Scene, generate};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::Common;
+use super::drive::{Capacity, conclusive, readings};
+use super::report::{Report, progress};
+use super::score::{Score, score};
+use super::spec;
+
+/// Counts the changes of [`scenes`]: results of different scenes must not be mixed in one file.
+const SCENES_VERSION: u32 = 1;
+
+/// Arguments of `evtach bench trust`.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    pub common: Common,
+    /// Number of scenes.
+    #[arg(long)]
+    trials: Option<u64>,
+    /// Results so far; scenes that are in it are not run again.
+    #[arg(long, default_value = "evtach-trust.jsonl")]
+    file: PathBuf,
+    /// Print the scene of one trial as JSON and run nothing.
+    #[arg(long, value_name = "TRIAL")]
+    show: Option<u64>,
+}
+
+/// First line of the file.
+#[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Head {
+    scenes_version: u32,
+    version: String,
+}
+
+/// What became of one scene.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Trial {
+    /// Seed of the scene.
+    trial: u64,
+    /// Rotors in the scene.
+    rotors: usize,
+    /// One for each capacity.
+    results: Vec<Outcome>,
+}
+
+/// What one capacity made of a scene.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Outcome {
+    capacity: String,
+    /// Speeds given where no rotor is, over all readings.
+    ghosts: usize,
+    /// Speeds given for rotors, over all readings.
+    speeds: usize,
+    /// Of these, more than 1 % off.
+    wrong: usize,
+    /// Why the last reading gave no speed at all.
+    reason: Option<String>,
+    /// The conclusive reading of each rotor.
+    rotors: Vec<Spoken>,
+}
+
+/// The conclusive reading of one rotor.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Spoken {
+    /// Whether a reading is owed: three periods, two turns, 20 px, 2000 events a turn.
+    owed: bool,
+    /// Relative error against the room; `None`: no speed.
+    error: Option<f64>,
+    /// Stated relative standard error.
+    sigma: Option<f64>,
+    /// Whether it is locked.
+    locked: bool,
+    /// Why there is no speed, where the rotor was found.
+    reason: Option<String>,
+}
+
+/// Runs the benchmark.
+pub fn run(args: &Args) -> anyhow::Result<Report> {
+    if let Some(trial) = args.show {
+        println!("{}", serde_json::to_string_pretty(&scenes::scene(trial))?);
+        return Ok(Report { name: "trust", ..Report::default() });
+    }
+    let count = args.trials.unwrap_or(if args.common.quick { 40 } else { 3000 });
+    if args.common.tuning && count > spec::SCORED_FROM {
+        bail!("there are only {} tuning seeds: give --trials {0} or fewer", spec::SCORED_FROM);
+    }
+    let first = spec::first_seed(args.common.tuning);
+    let wanted = first..first + count;
+    let known = if args.common.quick { Vec::new() } else { resume(&args.file)? };
+    let done: BTreeSet<u64> = known.iter().map(|t| t.trial).collect();
+    let todo: Vec<u64> = wanted.clone().filter(|t| !done.contains(t)).collect();
+    if !done.is_empty() {
+        eprintln!("{}: {} scenes done, {} to go", args.file.display(), done.len(), todo.len());
+    }
+    let sink = if args.common.quick {
+        None
+    } else {
+        let file = OpenOptions::new().append(true).open(&args.file);
+        Some(Mutex::new(file.with_context(|| {
+            format!("{}: cannot be written; choose another --file", args.file.display())
+        })?))
+    };
+    let bar = progress(todo.len(), "trust");
+    let fresh = todo
+        .par_iter()
+        .map(|&number| {
+            let trial = measure(number)?;
+            if let Some(sink) = &sink {
+                let line = serde_json::to_string(&trial)? + "\n";
+                let mut file = sink.lock().map_err(|_| anyhow::anyhow!("another trial failed"))?;
+                file.write_all(line.as_bytes())?;
+            }
+            bar.inc(1);
+            Ok(trial)
+        })
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    bar.finish_and_clear();
+    let mut trials: Vec<Trial> =
+        known.into_iter().filter(|t| wanted.contains(&t.trial)).chain(fresh).collect();
+    trials.sort_by_key(|t| t.trial);
+    Ok(tally::report(&trials))
+}
+
+/// Reads what a run before left, and starts the file where there is none.
+fn resume(path: &Path) -> anyhow::Result<Vec<Trial>> {
+    let head =
+        Head { scenes_version: SCENES_VERSION, version: env!("CARGO_PKG_VERSION").to_owned() };
+    if !path.exists() {
+        let mut file = std::fs::File::create(path).with_context(|| {
+            format!("{}: cannot be created; choose another --file", path.display())
+        })?;
+        writeln!(file, "{}", serde_json::to_string(&head)?)?;
+        return Ok(Vec::new());
+    }
+    let file = std::fs::File::open(path)
+        .with_context(|| format!("{}: cannot be read; choose another --file", path.display()))?;
+    let mut lines = BufReader::new(file).lines();
+    let first = lines.next().transpose()?.unwrap_or_default();
+    if serde_json::from_str::<Head>(&first).ok().as_ref() != Some(&head) {
+        bail!("{}: made by another version; delete it or choose another --file", path.display());
+    }
+    let mut trials = Vec::new();
+    for line in lines {
+        // A run that was stopped may have left half a line; its scene is run again.
+        if let Ok(trial) = serde_json::from_str(&line?) {
+            trials.push(trial);
+        }
+    }
+    Ok(trials)
+}
+
+fn measure(number: u64) -> anyhow::Result<Trial> {
+    let scene = scenes::scene(number);
+    let made = generate(&scene).with_context(|| format!("trial {number}"))?;
+    let motion = Motion::new(&scene);
+    let Some(geometry) = Geometry::new(scene.width_px, scene.height_px) else {
+        bail!("the scene's sensor is larger than the tachometer's");
+    };
+    let owed: Vec<bool> =
+        (0..scene.rotors.len()).map(|i| owed(&scene, made.truth.rotors[i].events, i)).collect();
+    let results = Capacity::ALL.iter().map(|&capacity| {
+        let series = readings(&made.events, &made.gyro, Settings::new(geometry), capacity);
+        outcome(&scene, &motion, &series, &owed, capacity)
+    });
+    Ok(Trial { trial: number, rotors: scene.rotors.len(), results: results.collect() })
+}
+
+/// Whether a reading of this rotor may be expected.
+fn owed(scene: &Scene, events: u64, number: usize) -> bool {
+    let rotor = &scene.rotors[number];
+    let turns = scene.duration_s().min(2.0) * rotor.rpm.abs() / 60.0;
+    let per_turn = events as f64 / (scene.duration_s() * rotor.rpm.abs() / 60.0);
+    let periods = turns * f64::from(rotor.blades);
+    turns >= 2.0 && periods >= 3.0 && rotor.radius_px >= 20.0 && per_turn >= 2000.0
+}
+
+fn outcome(
+    scene: &Scene,
+    motion: &Motion,
+    series: &[Reading],
+    owed: &[bool],
+    capacity: Capacity,
+) -> Outcome {
+    let scored: Vec<_> = series.iter().map(|reading| score(scene, motion, reading)).collect();
+    let errors = scored.iter().flat_map(|s| &s.rotors).flatten().filter_map(|s| s.room);
+    let wrong = errors.clone().filter(|e| e.abs() > 0.01).count();
+    let last = conclusive(series).map(|reading| score(scene, motion, reading));
+    let found = |number: usize| -> Score {
+        last.as_ref().and_then(|s| s.rotors.get(number).cloned().flatten()).unwrap_or_default()
+    };
+    let spoken = owed.iter().enumerate().map(|(number, &owed)| {
+        let s = found(number);
+        let reason = s.reason.map(str::to_owned);
+        Spoken { owed, error: s.room, sigma: s.sigma, locked: s.locked, reason }
+    });
+    Outcome {
+        capacity: capacity.as_str().to_owned(),
+        ghosts: scored.iter().map(|s| s.ghosts).sum(),
+        speeds: errors.count(),
+        wrong,
+        reason: series.last().and_then(|r| r.status.reason()).map(|r| r.as_str().to_owned()),
+        rotors: spoken.collect(),
+    }
+}
