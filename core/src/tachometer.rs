@@ -296,7 +296,7 @@ impl<'m> Tachometer<'m> {
         self.outcomes.clear();
         self.in_step_hz = None;
         weigh_heat(self.heat.counts(), self.weights);
-        let known = self.tracker.known().iter().filter(|known| known.is_fresh());
+        let known = self.tracker.known().iter().filter(|known| known.can_be_followed());
         for known in known {
             self.candidates.push((known.found, Some((known.parts, known.alike)))).ok();
         }
@@ -405,9 +405,7 @@ impl<'m> Tachometer<'m> {
                     blades: self.settings.blades,
                     clock_sigma_ppm: self.settings.clock_sigma_ppm,
                 };
-                let done =
-                    measurement.step(&window, &stated, &mut self.polar, &mut self.scanner, icp);
-                if !done {
+                if !measurement.step(&window, &stated, &mut self.polar, icp) {
                     return false;
                 }
                 let (index, outcome) = (*index, measurement.result());
