@@ -8,8 +8,8 @@ use evtach_core::{Poll, Reading, Tachometer};
 use crate::cost::{Clock, Costs, Spent};
 use crate::intake::{Block, Pace};
 
-/// Point operations in one piece of a measurement: at about 100 instructions each, 0.1 ms at 216 MHz.
-pub const BUDGET: u32 = 200;
+/// Steps of a measurement between two looks at what has arrived.
+pub const STEPS: u32 = 1;
 
 /// Measures until the last block, and hands every reading to `show` with what it cost.
 pub async fn measure<M: RawMutex>(
@@ -24,7 +24,7 @@ pub async fn measure<M: RawMutex>(
         last = push(tachometer, blocks.receive().await, costs);
         blocks.receive_done();
         loop {
-            match costs.poll(tachometer, BUDGET) {
+            match costs.poll(tachometer, STEPS) {
                 Poll::Idle => break,
                 Poll::Pending => {}
                 Poll::Ready(reading) => show(&reading, costs.take_spent()),
