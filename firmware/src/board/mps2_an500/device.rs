@@ -69,7 +69,7 @@ fn main() -> ! {
 
     Irq::Measure.set_priority(&mut peripherals.NVIC, 0xC0);
     Irq::Intake.set_priority(&mut peripherals.NVIC, 0x80);
-    match (measure_all(tachometer, receiver, pace), take_in(file, header, pace, sender)) {
+    match (measure_all(tachometer, header, receiver, pace), take_in(file, header, pace, sender)) {
         (Ok(measure), Ok(intake)) => {
             MEASURE.start(Irq::Measure).spawn(measure);
             INTAKE.start(Irq::Intake).spawn(intake);
@@ -128,6 +128,7 @@ async fn take_in(
 #[embassy_executor::task]
 async fn measure_all(
     tachometer: &'static mut Tachometer<'static>,
+    header: Header,
     mut blocks: Receiver<'static, Mutex, Block>,
     pace: Pace,
 ) {
@@ -139,7 +140,7 @@ async fn measure_all(
         writeln!(console, "{}spent push={push} poll={poll}", Lines(reading)).ok();
         console.flush();
     };
-    measure(tachometer, &mut blocks, pace, &mut costs, show).await;
+    measure(tachometer, &header, &mut blocks, pace, &mut costs, show).await;
     let mut console = Console::default();
     writeln!(
         console,
