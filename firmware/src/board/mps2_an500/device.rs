@@ -144,7 +144,8 @@ async fn measure_all(
     let mut console = Console::default();
     writeln!(
         console,
-        "{costs}memory tachometer={} store={} heat={} blocks={} stack={}",
+        "{costs}overrun events={}\nmemory tachometer={} store={} heat={} blocks={} stack={}",
+        tachometer.ignored().overrun,
         size_of::<Tachometer<'_>>(),
         size_of::<[StoredEvent; DEVICE_EVENTS]>(),
         HEAT_BYTES,
