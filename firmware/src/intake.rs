@@ -12,9 +12,9 @@ use crate::record::{Decoder, Header, HeaderError, RECORD_BYTES, Record};
 /// Events in one block: 128 x 8 B = 1 KiB; at 1 Mev/s a block fills in 128 us.
 pub const BLOCK_EVENTS: usize = 128;
 
-/// Blocks between taking in and measuring: 40 x 1 KiB = 40 KiB, 5 ms at 1 Mev/s. That is how long a step
-/// of the measurement may take: a million instructions at 216 MHz.
-pub const BLOCKS: usize = 40;
+/// Blocks between taking in and measuring: 32 x 1 KiB = 32 KiB, 4 ms at 1 Mev/s. That is how long a step
+/// of the measurement may take: 0.9 million instructions at 216 MHz.
+pub const BLOCKS: usize = 32;
 
 /// Events on their way from intake to measurement, still as records: half the memory of events.
 #[derive(Clone, Debug)]
