@@ -15,6 +15,7 @@ mod npy;
 mod open;
 mod prophesee_header;
 mod raw;
+mod ros2;
 pub mod write;
 
 use evtach_core::{Event, Geometry};
