@@ -189,6 +189,11 @@ pub fn order_from_numbers(rows: &[Vec<f64>]) -> ([usize; 4], String) {
     (columns, format!("columns {} from the first rows", order(columns)))
 }
 
+/// Whether a line names the columns.
+pub fn names_columns(line: &[u8]) -> bool {
+    std::str::from_utf8(line).is_ok_and(|line| columns_from_names(line.trim()).is_some())
+}
+
 /// Columns t, x, y, p with the unit their name tells, or `None` when the line does not name all four.
 fn columns_from_names(line: &str) -> Option<Vec<(usize, Option<Unit>)>> {
     let names: Vec<String> = line
