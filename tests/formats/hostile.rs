@@ -193,9 +193,14 @@ fn cut_files_give_what_is_there() {
             assert!(found.error.is_none(), "{name}: {:?}", found.error);
             let count = found.events.len();
             assert!(count > 10_000 && found.events == events[..count], "{name}: {count} events");
-            // Cutting the table behind AEDAT4's packets loses no event.
-            if count < events.len() {
-                assert!(!found.recording.side().notes.is_empty() || whole.len() % 2 == 0, "{name}");
+            // Without its last byte, AEDAT4 lacks a part of its table and text its last newline: no event.
+            if keep == whole.len() - 1 && !matches!(format, WriteFormat::Aedat4 | WriteFormat::Csv)
+            {
+                assert_eq!(
+                    (count, found.recording.side().notes.len()),
+                    (events.len() - 1, 1),
+                    "{name}"
+                );
             }
         }
     }
