@@ -88,8 +88,17 @@ fn evt3_vectors_advance() {
 
 #[test]
 fn evt21_in_both_byte_orders() {
-    let words: [u64; 2] = [8 << 60 | 3 << 32, 1 << 60 | 5 << 54 | 64 << 43 | 9 << 32 | 0x8000_0001];
-    let expected = [event(197, 64, 9, true), event(197, 95, 9, true)];
+    let words: [u64; 3] = [
+        8 << 60 | 3 << 32,
+        1 << 60 | 5 << 54 | 64 << 43 | 9 << 32 | 0x8000_0001,
+        6 << 54 | 32 << 43 | 9 << 32 | 0x8400,
+    ];
+    let expected = [
+        event(197, 64, 9, true),
+        event(197, 95, 9, true),
+        event(198, 42, 9, false),
+        event(198, 47, 9, false),
+    ];
     let little: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
     let legacy: Vec<u8> =
         words.iter().flat_map(|word| word.rotate_left(32).to_le_bytes()).collect();
