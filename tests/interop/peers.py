@@ -229,7 +229,7 @@ def clock(path):
     import faery
 
     best, count = None, 0
-    for _ in range(3):
+    for _ in range(5):
         start = time.perf_counter()
         count = sum(len(part) for part in faery.events_stream_from_file(path))
         spent = time.perf_counter() - start

@@ -44,6 +44,24 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Recording, RecordingEr
     Ok(Recording::new(opened, geometry, progress))
 }
 
+/// Opens a recording from any source of bytes, as a pipe is read: the size of the sensor must be told by the recording
+/// or by `options`, and .npz and .db3 are refused.
+///
+/// # Errors
+/// When the source cannot be read, is no known recording, or its sensor size is not told.
+pub fn open_reader(
+    reader: Box<dyn Read + Send>,
+    options: &OpenOptions,
+) -> Result<Recording, RecordingError> {
+    let progress = Progress::default();
+    let read = Arc::clone(&progress.read);
+    let input = Input::new(Box::new(Counted { reader, read }));
+    let opened = sniff(input, Path::new("-"), options.geometry, true)?;
+    let told = options.geometry.or(opened.geometry);
+    let geometry = told.ok_or(RecordingError::NoGeometry { format: opened.format })?;
+    Ok(Recording::new(opened, geometry, progress))
+}
+
 fn input(path: &Path, progress: &Progress) -> Result<Input, RecordingError> {
     let read = Arc::clone(&progress.read);
     if path.as_os_str() == "-" {

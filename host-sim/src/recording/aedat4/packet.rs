@@ -7,9 +7,9 @@ use crate::recording::error::{Place, RecordingError};
 use crate::recording::input::Input;
 
 /// Largest packet that is read; recorders write some ten kilobytes.
-const MAX_PACKET_BYTES: usize = 64 << 20;
+const MAX_PACKET_BYTES: usize = 32 << 20;
 /// Largest packet after decompression: the bound on this reader's memory.
-const MAX_UNPACKED_BYTES: usize = 256 << 20;
+const MAX_UNPACKED_BYTES: usize = 64 << 20;
 
 /// What was found where a packet was expected.
 pub enum Found {
