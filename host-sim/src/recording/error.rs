@@ -28,28 +28,28 @@ impl fmt::Display for Place {
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
     /// The file cannot be opened or created.
-    #[error("cannot open {path}: {source}\nhelp: check the path and its permissions")]
+    #[error("cannot open {path}: {cause}\nhelp: check the path and its permissions")]
     Open {
         /// The path as given.
         path: String,
         /// What the system said.
-        source: io::Error,
+        cause: io::Error,
     },
     /// Reading failed below the format.
     #[error(
-        "cannot read on at byte {offset}: {source}\nhelp: check the disk or the pipe; a compressed file may be cut short"
+        "cannot read on at byte {offset}: {cause}\nhelp: check the disk or the pipe; a compressed file may be cut short"
     )]
     Read {
         /// Bytes read so far.
         offset: u64,
         /// What the system said.
-        source: io::Error,
+        cause: io::Error,
     },
     /// Writing failed below the format.
     #[error(
         "cannot write: {0}\nhelp: check that the disk has room and that the reader of a pipe still runs"
     )]
-    Write(#[source] io::Error),
+    Write(io::Error),
     /// There is nothing in the file.
     #[error("the file is empty\nhelp: record again, or check that the copy finished")]
     Empty,

@@ -56,10 +56,10 @@ impl Input {
             Ok(0) => self.ended = true,
             Ok(count) => self.end += count,
             Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
-            Err(source) => {
+            Err(cause) => {
                 return Err(RecordingError::Read {
                     offset: self.offset + (self.end - self.start) as u64,
-                    source,
+                    cause,
                 });
             }
         }

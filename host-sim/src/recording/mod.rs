@@ -15,6 +15,7 @@ mod npy;
 mod open;
 mod prophesee_header;
 mod raw;
+mod ros2;
 pub mod write;
 
 use evtach_core::{Event, Geometry};
@@ -22,7 +23,7 @@ use evtach_core::{Event, Geometry};
 pub use error::{Place, RecordingError};
 pub use imu::ImuSample;
 use open::Progress;
-pub use open::open;
+pub use open::{open, open_reader};
 
 /// Parses a sensor size such as "640x480".
 ///

@@ -14,6 +14,7 @@ use super::input::Input;
 use super::prophesee_header::Header;
 use super::{
     OpenOptions, Opened, Recording, Side, aedat2, aedat3, aedat4, csv, dat, es, geometry, npy, raw,
+    ros2,
 };
 
 /// Bytes looked at to tell text from binary.
@@ -43,12 +44,30 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Recording, RecordingEr
     Ok(Recording::new(opened, geometry, progress))
 }
 
+/// Opens a recording from any source of bytes, as a pipe is read: the size of the sensor must be told by the recording
+/// or by `options`, and .npz and .db3 are refused.
+///
+/// # Errors
+/// When the source cannot be read, is no known recording, or its sensor size is not told.
+pub fn open_reader(
+    reader: Box<dyn Read + Send>,
+    options: &OpenOptions,
+) -> Result<Recording, RecordingError> {
+    let progress = Progress::default();
+    let read = Arc::clone(&progress.read);
+    let input = Input::new(Box::new(Counted { reader, read }));
+    let opened = sniff(input, Path::new("-"), options.geometry, true)?;
+    let told = options.geometry.or(opened.geometry);
+    let geometry = told.ok_or(RecordingError::NoGeometry { format: opened.format })?;
+    Ok(Recording::new(opened, geometry, progress))
+}
+
 fn input(path: &Path, progress: &Progress) -> Result<Input, RecordingError> {
     let read = Arc::clone(&progress.read);
     if path.as_os_str() == "-" {
         return Ok(Input::new(Box::new(Counted { reader: std::io::stdin(), read })));
     }
-    let opening = |source| RecordingError::Open { path: path.display().to_string(), source };
+    let opening = |cause| RecordingError::Open { path: path.display().to_string(), cause };
     if std::fs::metadata(path).map_err(opening)?.is_dir() {
         return Err(RecordingError::Unsupported {
             what: "this is a folder".to_owned(),
@@ -156,6 +175,16 @@ fn sniff(
             Err(needs_file("an .npz archive"))
         } else {
             npy::open_npz(path)
+        };
+    }
+    if head.starts_with(ros2::MCAP_MAGIC) {
+        return ros2::open_mcap(input);
+    }
+    if head.starts_with(ros2::SQLITE_MAGIC) {
+        return if path.as_os_str() == "-" || !unpack {
+            Err(needs_file("a .db3 bag"))
+        } else {
+            ros2::open_sqlite(path)
         };
     }
     if head.starts_with(b"\x89HDF\r\n\x1a\n") {

@@ -107,6 +107,21 @@ impl Header {
     }
 }
 
+/// Where a further header begins in the midst of data, as in recordings that were put behind each other: two lines of
+/// text at least, each with its `% `.
+pub fn find_further(bytes: &[u8]) -> Option<usize> {
+    const LONGEST_LINE: usize = 1024;
+    memchr::memmem::find_iter(bytes, b"\n% ").find_map(|newline| {
+        let before = &bytes[newline.saturating_sub(LONGEST_LINE)..newline];
+        let text = before.iter().rev().take_while(|byte| (0x20..0x7f).contains(*byte)).count();
+        let line = &before[before.len() - text..];
+        let start = memchr::memmem::rfind(line, b"% ")?;
+        let is_key = line.get(start + 2).is_some_and(u8::is_ascii_alphabetic);
+        let next_is_key = bytes.get(newline + 3).is_some_and(u8::is_ascii_alphabetic);
+        (is_key && next_is_key).then(|| newline - line.len() + start)
+    })
+}
+
 /// The header line at `from`, newline included; `None` where the data begins.
 fn peek_line(input: &mut Input, from: usize) -> Result<Option<Vec<u8>>, RecordingError> {
     let mut want = from + 4096;
@@ -131,5 +146,20 @@ fn peek_line(input: &mut Input, from: usize) -> Result<Option<Vec<u8>>, Recordin
             }
             None => want += want.max(4096),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn further_headers_are_found_in_data() {
+        let data =
+            [&[0x25, 0x20, 0x0a, 0x80, 0x61][..], b"% evt 3.0\n% geometry 4x4\n% end\n", &[1, 2]]
+                .concat();
+        assert_eq!(find_further(&data), Some(5));
+        assert_eq!(find_further(b"\n% \x00\x01% a\x01\n% b"), None);
+        assert_eq!(find_further(b""), None);
     }
 }

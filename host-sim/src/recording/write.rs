@@ -129,7 +129,7 @@ pub fn create(
         Target::Pipe(Box::new(BufWriter::new(std::io::stdout())))
     } else {
         let file = File::create(path)
-            .map_err(|source| RecordingError::Open { path: path.display().to_string(), source })?;
+            .map_err(|cause| RecordingError::Open { path: path.display().to_string(), cause })?;
         Target::File(BufWriter::with_capacity(1 << 18, file))
     };
     let sink: Box<dyn Sink> = match format {

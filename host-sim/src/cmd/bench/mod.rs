@@ -5,6 +5,7 @@
 
 mod accuracy;
 mod blind;
+mod decode;
 mod drive;
 mod peers;
 mod report;
@@ -27,6 +28,8 @@ pub struct Args {
 enum Table {
     /// Instructions and bytes on the device, counted in QEMU.
     Cost(cost::Args),
+    /// Events decoded a second, for each format, beside faery.
+    Decode(decode::Args),
     /// Relative error by speed, distance, blades, hand and vibration: the paper's evaluations.
     Accuracy(accuracy::Args),
     /// Share of right readings over 60 to 60 000 rpm and 1 to 8 blades.
@@ -60,7 +63,7 @@ pub struct Common {
 /// Runs the subcommand.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let common = match &args.table {
-        Table::Cost(_) => None,
+        Table::Cost(_) | Table::Decode(_) => None,
         Table::Accuracy(args) => Some(args.common),
         Table::Blind(args) => Some(args.common),
         Table::Peers(args) => Some(args.common),
@@ -71,6 +74,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let report = match args.table {
         Table::Cost(args) => return cost::run(args),
+        Table::Decode(args) => return decode::run(&args),
         Table::Accuracy(args) => accuracy::run(&args)?,
         Table::Blind(args) => blind::run(&args)?,
         Table::Peers(args) => peers::run(&args)?,

@@ -7,9 +7,9 @@ use crate::recording::error::{Place, RecordingError};
 use crate::recording::input::Input;
 
 /// Largest packet that is read; recorders write some ten kilobytes.
-const MAX_PACKET_BYTES: usize = 64 << 20;
+const MAX_PACKET_BYTES: usize = 32 << 20;
 /// Largest packet after decompression: the bound on this reader's memory.
-const MAX_UNPACKED_BYTES: usize = 256 << 20;
+const MAX_UNPACKED_BYTES: usize = 64 << 20;
 
 /// What was found where a packet was expected.
 pub enum Found {
@@ -50,6 +50,15 @@ impl Packets {
         self.unpacked.get(4..).unwrap_or_default()
     }
 
+    /// Where another recording begins behind this one, as in files that were put behind each other. Looks past the
+    /// table of packets, which takes some 50 bytes for each packet.
+    pub fn further(&mut self) -> Result<Option<u64>, RecordingError> {
+        const REACH_BYTES: usize = 4 << 20;
+        let offset = self.input.offset();
+        let bytes = self.input.peek(REACH_BYTES)?;
+        Ok(memchr::memmem::find(bytes, super::MAGIC).map(|at| offset + at as u64))
+    }
+
     /// Goes to the next packet; unpacks it when its stream is wanted.
     pub fn next(&mut self, wanted: impl Fn(i32) -> bool) -> Result<Found, RecordingError> {
         let offset = self.input.offset();
@@ -60,6 +69,9 @@ impl Packets {
         let &[i0, i1, i2, i3, s0, s1, s2, s3, ..] = head else {
             return Ok(if head.is_empty() { Found::End } else { Found::Cut(head.len()) });
         };
+        if head.starts_with(&super::MAGIC[..8]) {
+            return Ok(Found::End);
+        }
         let stream = i32::from_le_bytes([i0, i1, i2, i3]);
         let size = u32::from_le_bytes([s0, s1, s2, s3]) as usize;
         if size > MAX_PACKET_BYTES {

@@ -86,7 +86,14 @@ impl Source for Aedat4 {
                 Ok(true)
             }
             Found::Skipped => Ok(true),
-            Found::End => Ok(false),
+            Found::End => {
+                if let Some(at) = self.packets.further()? {
+                    side.notes.push(format!(
+                        "another recording begins at byte {at} and was left out: cut the file there to read it"
+                    ));
+                }
+                Ok(false)
+            }
             Found::Cut(bytes) => {
                 side.notes.push(format!(
                     "the file ends inside a packet: {bytes} bytes at byte {offset} left out"

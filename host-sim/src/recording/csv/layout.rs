@@ -86,6 +86,7 @@ pub fn find(head: &str) -> Result<Layout, RecordingError> {
                 layout.geometry = geometry::parse(value.trim());
                 vendor_order = true;
             } else if let Some(found) = columns_from_names(bare) {
+                layout.geometry = size_from_names(bare).or(layout.geometry);
                 names = Some(found);
             } else if !line.is_empty() && !line.starts_with(['#', '%']) {
                 return Err(not_events(layout.skip_lines, line));
@@ -111,7 +112,7 @@ pub fn find(head: &str) -> Result<Layout, RecordingError> {
         return Err(not_events(layout.skip_lines + 1, head.lines().next().unwrap_or_default()));
     }
     if let Some(geometry) = layout.geometry {
-        layout.assumed.push(format!("{} from the first line", geometry::show(geometry)));
+        layout.assumed.push(format!("{} from the first lines", geometry::show(geometry)));
     }
     let mut told_unit = None;
     if let Some(names) = names {
@@ -149,7 +150,8 @@ fn order(columns: [usize; 4]) -> String {
 
 /// Splits "timestamp [us]" or "t_us" into name and unit.
 pub fn unit_of_name(name: &str) -> (String, Option<Unit>) {
-    let (stem, suffix) = name.split_once(['_', '[', '(', ' ']).unwrap_or((name, ""));
+    // faery writes the size into the names: "x@640".
+    let (stem, suffix) = name.split_once(['_', '[', '(', ' ', '@']).unwrap_or((name, ""));
     let unit = match suffix.trim_matches(|c: char| !c.is_ascii_alphabetic()) {
         "s" | "sec" | "seconds" => Some(Unit::Seconds),
         "ms" | "milliseconds" => Some(Unit::Milliseconds),
@@ -158,6 +160,16 @@ pub fn unit_of_name(name: &str) -> (String, Option<Unit>) {
         _ => None,
     };
     (stem.trim().to_owned(), unit)
+}
+
+/// Size in names such as "x@640,y@480".
+fn size_from_names(line: &str) -> Option<Geometry> {
+    let side = |axis: &str| {
+        let name =
+            line.split([',', ';', '\t', ' ']).find_map(|name| name.trim().strip_prefix(axis))?;
+        name.parse().ok()
+    };
+    Geometry::new(side("x@")?, side("y@")?)
 }
 
 /// One column of the first rows as numbers.
@@ -175,6 +187,11 @@ pub fn order_from_numbers(rows: &[Vec<f64>]) -> ([usize; 4], String) {
         text.iter().map(|row| row.iter().map(String::as_str).collect()).collect();
     let columns = columns_from_rows(&rows);
     (columns, format!("columns {} from the first rows", order(columns)))
+}
+
+/// Whether a line names the columns.
+pub fn names_columns(line: &[u8]) -> bool {
+    std::str::from_utf8(line).is_ok_and(|line| columns_from_names(line.trim()).is_some())
 }
 
 /// Columns t, x, y, p with the unit their name tells, or `None` when the line does not name all four.
@@ -254,6 +271,8 @@ mod tests {
             columns("# timestamp [ns], x, y, p\n5000,1,2,1\n"),
             ([0, 1, 2, 3], Unit::Nanoseconds)
         );
+        let faery = find("t,x@320,y@240,on\n5,1,2,1\n").unwrap();
+        assert_eq!((faery.columns, faery.geometry), ([0, 1, 2, 3], Geometry::new(320, 240)));
         assert_eq!(columns("t_s x y p\n0.5 1 2 1\n"), ([0, 1, 2, 3], Unit::Seconds));
     }
 

@@ -71,6 +71,10 @@ impl Source for Text {
             }
             match event(line, &self.layout) {
                 Ok(event) => events.extend(event),
+                // The names again: another recording was put behind the one before.
+                Err(_) if layout::names_columns(line) => {
+                    side.notes.push(format!("another recording begins at line {}", self.line));
+                }
                 // The last line of a cut file.
                 Err(_) if end == bytes.len() && last => {
                     side.notes.push(format!(

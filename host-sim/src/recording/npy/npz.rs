@@ -112,13 +112,13 @@ fn members(path: &Path) -> Result<Vec<Member>, RecordingError> {
 
 fn file(path: &Path) -> Result<File, RecordingError> {
     File::open(path)
-        .map_err(|source| RecordingError::Open { path: path.display().to_string(), source })
+        .map_err(|cause| RecordingError::Open { path: path.display().to_string(), cause })
 }
 
 fn input(path: &Path, member: &Member) -> Result<Input, RecordingError> {
     let mut file = file(path)?;
     file.seek(SeekFrom::Start(member.start))
-        .map_err(|source| RecordingError::Read { offset: member.start, source })?;
+        .map_err(|cause| RecordingError::Read { offset: member.start, cause })?;
     let packed = file.take(member.size);
     Ok(Input::new(if member.deflated {
         Box::new(DeflateDecoder::new(packed))

@@ -5,26 +5,31 @@ use evtach_core::decode::{Evt2, Evt3, Evt21};
 
 use crate::recording::error::RecordingError;
 use crate::recording::input::Input;
-use crate::recording::prophesee_header::Header;
+use crate::recording::prophesee_header::{Header, find_further};
 use crate::recording::{Opened, Side, Source};
 
 /// Bytes decoded in one go.
 const CHUNK_BYTES: usize = 64 * 1024;
+/// Bytes looked at behind a chunk, so that a header across its border is seen.
+const OVERLAP_BYTES: usize = 2048;
 
 /// Opens a RAW file behind its header.
 pub(crate) fn open(mut input: Input, header: Header) -> Result<Opened, RecordingError> {
     input.consume(header.length);
-    let encoding = header
-        .format()
-        .map(str::to_ascii_uppercase)
-        .or_else(|| header.get("evt").map(|version| format!("EVT{version}")))
-        .unwrap_or_default();
+    let encoding = encoding(&header);
     let (format, source): (_, Box<dyn Source>) = match encoding.as_str() {
-        "EVT3" | "EVT3.0" => ("EVT3", Box::new(Words::new(input, Evt3::new()))),
-        "EVT2" | "EVT2.0" => ("EVT2", Box::new(Words::new(input, Evt2::new()))),
+        "EVT3" | "EVT3.0" => ("EVT3", Box::new(Words::new(input, Evt3::new(), encoding))),
+        "EVT2" | "EVT2.0" => ("EVT2", Box::new(Words::new(input, Evt2::new(), encoding))),
         "EVT21" | "EVT2.1" => {
             let swapped = is_swapped(&mut input, &header)?;
-            ("EVT2.1", Box::new(Words::new(input, Evt21Bytes { decoder: Evt21::new(), swapped })))
+            (
+                "EVT2.1",
+                Box::new(Words::new(
+                    input,
+                    Evt21Bytes { decoder: Evt21::new(), swapped },
+                    encoding,
+                )),
+            )
         }
         _ => {
             return Err(RecordingError::Unsupported {
@@ -43,14 +48,28 @@ pub(crate) fn open(mut input: Input, header: Header) -> Result<Opened, Recording
     Ok(Opened { format, geometry, assumed, about: header.fields, source })
 }
 
+/// The encoding a header names.
+fn encoding(header: &Header) -> String {
+    header
+        .format()
+        .map(str::to_ascii_uppercase)
+        .or_else(|| header.get("evt").map(|version| format!("EVT{version}")))
+        .unwrap_or_default()
+}
+
 /// What the word decoders of the core have in common.
 trait Decoder: Send {
     const WORD_BYTES: usize;
     fn decode(&mut self, words: &[u8], events: &mut Vec<Event>);
     fn report(&self, side: &mut Side);
+    fn restart(&mut self);
 }
 
 impl Decoder for Evt2 {
+    fn restart(&mut self) {
+        *self = Self::new();
+    }
+
     const WORD_BYTES: usize = 4;
 
     fn decode(&mut self, words: &[u8], events: &mut Vec<Event>) {
@@ -66,6 +85,10 @@ impl Decoder for Evt2 {
 }
 
 impl Decoder for Evt3 {
+    fn restart(&mut self) {
+        *self = Self::new();
+    }
+
     const WORD_BYTES: usize = 2;
 
     fn decode(&mut self, words: &[u8], events: &mut Vec<Event>) {
@@ -87,6 +110,10 @@ struct Evt21Bytes {
 }
 
 impl Decoder for Evt21Bytes {
+    fn restart(&mut self) {
+        self.decoder = Evt21::new();
+    }
+
     const WORD_BYTES: usize = 8;
 
     fn decode(&mut self, words: &[u8], events: &mut Vec<Event>) {
@@ -111,40 +138,74 @@ fn is_swapped(input: &mut Input, header: &Header) -> Result<bool, RecordingError
         None => {}
     }
     let words = input.peek(CHUNK_BYTES)?.as_chunks::<8>().0;
-    let time_words = |at: usize| words.iter().filter(|word| word[at] >> 4 == 0x8).count();
-    Ok(time_words(3) > time_words(7))
+    // Time words, and pixel words whose first column is a multiple of 32 as the format wants.
+    let sensible = |half: u32| {
+        let words = words.iter().map(|word| u64::from_le_bytes(*word).rotate_left(half));
+        words.filter(|word| word >> 60 == 8 || word >> 60 <= 1 && (word >> 43) & 0x1f == 0).count()
+    };
+    Ok(sensible(32) > sensible(0))
 }
 
 struct Words<D> {
     input: Input,
     decoder: D,
+    /// Name of the encoding, to compare with that of a further header.
+    encoding: String,
+    /// Data up to here has been searched for further headers.
+    searched: u64,
 }
 
 impl<D: Decoder> Words<D> {
-    const fn new(input: Input, decoder: D) -> Self {
-        Self { input, decoder }
+    const fn new(input: Input, decoder: D, encoding: String) -> Self {
+        Self { input, decoder, encoding, searched: 0 }
+    }
+
+    /// Goes past the header of a recording that was put behind the one before; `false` when it is data after all.
+    fn further(&mut self, side: &mut Side) -> Result<bool, RecordingError> {
+        let offset = self.input.offset();
+        let header = Header::peek(&mut self.input)?;
+        if encoding(&header) != self.encoding {
+            return Ok(false);
+        }
+        self.input.consume(header.length);
+        self.decoder.restart();
+        side.notes.push(format!("another recording begins at byte {offset}: its time starts anew"));
+        Ok(true)
     }
 }
 
 impl<D: Decoder> Source for Words<D> {
     fn read(&mut self, events: &mut Vec<Event>, side: &mut Side) -> Result<bool, RecordingError> {
-        let bytes = self.input.peek(D::WORD_BYTES)?;
-        let whole = bytes.len().min(CHUNK_BYTES) / D::WORD_BYTES * D::WORD_BYTES;
-        if whole == 0 {
-            let rest = bytes.len();
-            if rest > 0 {
-                side.notes.push(format!(
-                    "the file ends inside a word: {rest} bytes at byte {} left out",
-                    self.input.offset()
-                ));
-                self.input.consume(rest);
+        let offset = self.input.offset();
+        let bytes = self.input.peek(CHUNK_BYTES + OVERLAP_BYTES)?;
+        let mut chunk = bytes.len().min(CHUNK_BYTES);
+        let available = bytes.len();
+        let last = available <= CHUNK_BYTES;
+        if offset >= self.searched {
+            let found = find_further(&bytes[..bytes.len().min(CHUNK_BYTES + OVERLAP_BYTES)]);
+            match found.filter(|&at| at < chunk) {
+                Some(0) => {
+                    if self.further(side)? {
+                        return Ok(true);
+                    }
+                    self.searched = offset + chunk as u64;
+                    return Ok(true);
+                }
+                Some(at) => chunk = at,
+                None => {}
             }
-            return Ok(false);
         }
+        let whole = chunk / D::WORD_BYTES * D::WORD_BYTES;
         events.reserve(whole / D::WORD_BYTES);
         self.decoder.decode(&bytes[..whole], events);
-        self.input.consume(whole);
         self.decoder.report(side);
-        Ok(true)
+        let rest = chunk - whole;
+        if rest > 0 {
+            let at = offset + whole as u64;
+            side.notes
+                .push(format!("{rest} bytes at byte {at} left out: the data ends inside a word"));
+        }
+        self.input.consume(chunk);
+        Ok(!last || chunk < available)
     }
 }

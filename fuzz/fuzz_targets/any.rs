@@ -1,0 +1,8 @@
+//! Any bytes: recognising the format, and the format they look like.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| {
+    evtach_fuzz::read_behind(b"", data);
+});

@@ -1,0 +1,25 @@
+//! The wire-word decoders of the core, as the device feeds them.
+#![no_main]
+
+use evtach_core::decode::{Davis, Dvxplorer, Evt2, Evt3, Evt21, Mounting};
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| {
+    let (mut evt2, mut evt21, mut evt3) = (Evt2::new(), Evt21::new(), Evt3::new());
+    let mut davis = Davis::new(Mounting { swap_xy: data.len() % 2 == 0, flip_gyro_z: data.len() % 3 == 0 });
+    let mut dvxplorer = Dvxplorer::new();
+    for word in data.as_chunks().0 {
+        evt2.decode(u32::from_le_bytes(*word), |event| assert!(event.x < 2048 && event.y < 2048));
+    }
+    for word in data.as_chunks().0 {
+        evt21.decode(u64::from_le_bytes(*word), |event| assert!(event.x < 2048 + 32 && event.y < 2048));
+    }
+    for word in data.as_chunks().0 {
+        let word = u16::from_le_bytes(*word);
+        evt3.decode(word, |event| assert!(event.y < 2048));
+        if let Some(sample) = davis.decode(word, |event| assert!(event.x < 4096 && event.y < 4096)) {
+            assert!(sample.roll_rad_s.abs() < 40.0);
+        }
+        dvxplorer.decode(word, |event| assert!(event.x < 1024 && event.y < 480));
+    }
+});
