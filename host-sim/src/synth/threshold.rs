@@ -18,7 +18,7 @@ const PASSES: (u32, u32) = (4, 8);
 const MOVING_PASSES: (u32, u32) = (1, 4);
 
 /// Simulates one pixel.
-pub fn run(field: &Field, view: &View, pixel: &mut Pixel, span: &Span, tray: &mut Tray) {
+pub fn run(field: &Field, view: &mut View, pixel: &mut Pixel, span: &Span, tray: &mut Tray) {
     let start_s = -field.warm_up_s(view);
     // What matters is how far the level is from the reference. With unequal thresholds that wanders from period to period
     // without ever settling; drawing the number of passes puts each pixel at another point of its round.
@@ -46,7 +46,7 @@ struct State {
 /// Advances one pixel to a time, or a little beyond it when it is then held in reset.
 fn advance(
     field: &Field,
-    view: &View,
+    view: &mut View,
     pixel: &mut Pixel,
     from: State,
     end_s: f64,
