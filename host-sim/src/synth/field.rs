@@ -258,7 +258,9 @@ impl<'a> Field<'a> {
                 angle: Line::default(),
             }));
         }
-        let lit = self.light.as_ref().is_some_and(|light| light.swing([x, y]) > threshold * 0.9);
+        // On a rotor even a light too faint for events of its own moves the edges' events.
+        let least = if layers.is_empty() { threshold * 0.9 } else { 0.01 };
+        let lit = self.light.as_ref().is_some_and(|light| light.swing([x, y]) > least);
         let textured = self.texture.is_some();
         let shaded = !self.shades.is_empty();
         let moves = textured && self.camera_moves;
@@ -280,7 +282,7 @@ impl<'a> Field<'a> {
             intensity: Line { value: 1.0, rate: 0.0 },
             depth: Line::default(),
         };
-        if !self.rotors_move {
+        if !self.rotors_move || (view.layers.is_empty() && !self.camera_moves) {
             self.hold(&mut view);
         }
         Some(view)
