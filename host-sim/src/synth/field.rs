@@ -235,7 +235,7 @@ impl<'a> Field<'a> {
         if let Some(light) = self.light.as_ref().filter(|_| view.lit) {
             warm_up = warm_up.max(2.0 * light.period_s());
         }
-        warm_up + 1e-3
+        warm_up
     }
 
     /// Whether the rotors' centres move on the sensor.

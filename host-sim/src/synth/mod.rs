@@ -54,7 +54,7 @@ pub fn generate(scene: &Scene) -> Result<Synthetic, SceneError> {
     let field = Field::new(
         scene,
         &motion,
-        -longest_period_s - 2.0 * threshold::TAIL_S,
+        -longest_period_s - 4.0 * threshold::TAIL_S,
         duration_s + 2.0 * threshold::TAIL_S,
         renders_rotors,
     );
