@@ -79,7 +79,9 @@ fn paint(
             ),
             None => letter(rotor.id),
         };
-        area.draw(&Text::new(tag, (x + 10, y - 12), font))?;
+        // Above the disc, where it is dark; inside at the frame's upper edge.
+        let above = y - radius as i32 - 32;
+        area.draw(&Text::new(tag, (x - 60, above.max(2)), font))?;
     }
     area.present()
 }

@@ -20,7 +20,7 @@ const SIZE: (u32, u32) = (900, 560);
 struct Folded {
     /// Share of the busiest cell, by column and row, ON and OFF.
     cells: Vec<[f64; 2]>,
-    /// Middle of each column in seconds from the window's middle, and the residual in degrees of the rotor.
+    /// Middle of each block in seconds from the window's middle, and the residual in degrees of the rotor.
     residuals: Vec<(f64, f64)>,
     window_s: f64,
     pitch_deg: f64,
@@ -41,7 +41,7 @@ pub fn draw(subject: &Subject<'_>, id: u8) -> Result<Option<String>, ReportError
     let middle_s = (reading.t_us - subject.facts.first_us.min(reading.t_us)) as f64 * 1e-6;
     let text = format!(
         "<p>The window of {:.0} ms around {middle_s:.3} s, events turned back by the measured speed and folded by {} \
-         (light: ON, dark: OFF). Below: the residual of the phase, in degrees of the rotor.</p>\n",
+         (light: ON, dark: OFF). Below: what is left of the phase over whole symmetry periods, in degrees of the rotor.</p>\n",
         folded.window_s * 1e3,
         rotor.blades.map_or("whole turns".to_owned(), |n| format!("{n} blades")),
     );
@@ -57,7 +57,11 @@ fn fold(subject: &Subject<'_>, reading: &Reading, rotor: &RotorReading) -> Optio
     let n = f64::from(rotor.blades.unwrap_or(1));
     let radius = f64::from(rotor.radius_px) * 1.05;
     let mut cells = vec![[0.0f64; 2]; COLUMNS * ROWS];
-    let mut phasors = vec![(0.0f64, 0.0f64); COLUMNS];
+    // Blades at different places give different phases: only whole symmetry periods compare.
+    let periods = omega.abs() * n * window_s / TAU;
+    let per_block = (periods / COLUMNS as f64).ceil().max(1.0);
+    let block_s = window_s * per_block / periods;
+    let mut phasors = vec![(0.0f64, 0.0f64); (periods / per_block) as usize];
     for event in subject.events {
         let t_s = (event.t_us as f64 - reading.t_us as f64) * 1e-6;
         let (dx, dy) = (
@@ -75,8 +79,10 @@ fn fold(subject: &Subject<'_>, reading: &Reading, rotor: &RotorReading) -> Optio
         let on = event.polarity == Polarity::On;
         cells[column * ROWS + row][usize::from(on)] += 1.0;
         let sign = if on { 1.0 } else { -1.0 };
-        phasors[column].0 += sign * folded.cos();
-        phasors[column].1 += sign * folded.sin();
+        if let Some(phasor) = phasors.get_mut(((t_s + window_s / 2.0) / block_s) as usize) {
+            phasor.0 += sign * folded.cos();
+            phasor.1 += sign * folded.sin();
+        }
     }
     let busiest = cells.iter().flatten().copied().fold(0.0, f64::max);
     if busiest == 0.0 {
@@ -85,12 +91,12 @@ fn fold(subject: &Subject<'_>, reading: &Reading, rotor: &RotorReading) -> Optio
     cells.iter_mut().flatten().for_each(|cell| *cell /= busiest);
     let whole = phasors.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0, sum.1 + p.1));
     let mean = f64::atan2(whole.1, whole.0);
-    let residuals =
-        phasors.iter().enumerate().filter(|(_, p)| p.0 != 0.0 || p.1 != 0.0).map(|(i, p)| {
-            let left = p.1.atan2(p.0) - mean;
-            let left = left - TAU * (left / TAU).round();
-            (((i as f64 + 0.5) / COLUMNS as f64 - 0.5) * window_s, (left / n).to_degrees())
-        });
+    let seen = phasors.iter().enumerate().filter(|(_, p)| p.0 != 0.0 || p.1 != 0.0);
+    let residuals = seen.map(|(i, p)| {
+        let left = p.1.atan2(p.0) - mean;
+        let left = left - TAU * (left / TAU).round();
+        ((i as f64 + 0.5) * block_s - window_s / 2.0, (left / n).to_degrees())
+    });
     Some(Folded { cells, residuals: residuals.collect(), window_s, pitch_deg: 360.0 / n })
 }
 
@@ -130,6 +136,7 @@ fn paint(
         .configure_mesh()
         .x_desc("time from the middle of the window (ms)")
         .y_desc("residual (deg)")
+        .light_line_style(WHITE)
         .x_labels(7)
         .y_labels(5)
         .draw()?;
@@ -138,6 +145,6 @@ fn paint(
         [(-half_ms, 0.0), (half_ms, 0.0)],
         BLACK.stroke_width(1),
     )])?;
-    chart.draw_series(points.map(|point| Circle::new(point, 2, colour(id).filled())))?;
+    chart.draw_series(points.map(|point| Circle::new(point, 3, colour(id).filled())))?;
     area.present()
 }

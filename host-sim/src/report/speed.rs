@@ -73,6 +73,7 @@ fn paint(
             .configure_mesh()
             .x_desc("time from the first event (s)")
             .y_desc(format!("rotor {} (rpm)", letter(*id)))
+            .light_line_style(WHITE)
             .y_labels(6)
             .draw()?;
         let paint = colour(*id);
