@@ -18,7 +18,8 @@ use evtach_host::synth::{self, Rotor, Scene};
 fn readings_on_pc(geometry: Geometry, events: &[Event]) -> Vec<Reading> {
     let mut store = vec![StoredEvent::default(); DEVICE_EVENTS];
     let mut heat = vec![0; DEVICE_HEAT_CELLS];
-    let memory = Memory { events: &mut store, heat: &mut heat };
+    let mut weights = vec![0; DEVICE_HEAT_CELLS];
+    let memory = Memory { events: &mut store, heat: &mut heat, weights: &mut weights };
     let mut tachometer = Tachometer::new(Settings::new(geometry), memory);
     let mut readings = Vec::new();
     let mut drain = |tachometer: &mut Tachometer<'_>| {
