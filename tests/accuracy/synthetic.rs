@@ -107,7 +107,8 @@ fn blade_counts() {
     for blades in 1..=5 {
         for model in [Model::Threshold, Model::Edge] {
             let rotor = Rotor { blades, rpm: -1700.0, ..Rotor::default() };
-            failures.extend(wrong(&format!("{model:?}"), &one(rotor, model, 20 + u64::from(blades))));
+            failures
+                .extend(wrong(&format!("{model:?}"), &one(rotor, model, 20 + u64::from(blades))));
         }
     }
     assert!(failures.is_empty(), "\n{}", failures.join("\n"));

@@ -60,8 +60,7 @@ fn rotor() -> Vec<Event> {
 /// Nothing but noise.
 fn noise() -> Vec<Event> {
     let (width_px, height_px) = SIDES_PX;
-    let scene =
-        Scene { width_px, height_px, rotors: Vec::new(), seed: 71, ..Scene::default() };
+    let scene = Scene { width_px, height_px, rotors: Vec::new(), seed: 71, ..Scene::default() };
     generate(&scene).expect("a scene in range").events
 }
 
