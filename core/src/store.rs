@@ -229,7 +229,7 @@ impl<'m> Store<'m> {
     /// Counts events lost before they reached the store.
     pub fn lost(&mut self, count: u64) {
         let slot = self.slot(self.closed);
-        self.segments[slot].lost += count;
+        self.segments[slot].lost = self.segments[slot].lost.saturating_add(count);
     }
 
     /// Makes segments longer, keeping what is stored: each new segment keeps the burst of the first old one in
@@ -286,7 +286,7 @@ impl<'m> Store<'m> {
             }
             for (i, segment) in old.iter().enumerate().take(self.closed + 1) {
                 if (i as u64 * old_us) / u64::from(segment_us) == new as u64 {
-                    merged.lost += segment.lost;
+                    merged.lost = merged.lost.saturating_add(segment.lost);
                     merged.roll_sum_rad_s += segment.roll_sum_rad_s;
                     merged.roll_count += segment.roll_count;
                 }
@@ -382,7 +382,7 @@ impl<'m> Store<'m> {
             let segment = &self.segments[self.slot(index)];
             account.counted += segment.counted;
             account.kept += segment.len as u64;
-            account.lost += segment.lost;
+            account.lost = account.lost.saturating_add(segment.lost);
             account.roll_sum_rad_s += segment.roll_sum_rad_s;
             account.roll_count += segment.roll_count;
         }

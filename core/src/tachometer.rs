@@ -50,6 +50,8 @@ const MOST_LOST: f32 = 0.5;
 const MOST_MEASURED: usize = 12;
 /// Time going back by more than this restarts the window; less is disorder, and the event is left out.
 const CLOCK_RESET_US: u64 = 1_000_000;
+/// Latest sensor time that is believed: beyond it (292 000 years) sums of times could overflow.
+const LATEST_US: u64 = u64::MAX / 2;
 /// Standard deviation of a gyro's zero-rate offset in rad/s, calibrated on a still camera.
 const GYRO_OFFSET_RAD_S: f32 = 3e-3;
 
@@ -128,7 +130,7 @@ pub struct Ignored {
     pub out_of_bounds: u64,
     /// Outside the region of interest.
     pub out_of_roi: u64,
-    /// Older than the event before.
+    /// Older than the event before, or from a future that no clock reaches.
     pub out_of_order: u64,
     /// Arrived while a measurement held the store for too long; the window was given up.
     pub overrun: u64,
@@ -225,6 +227,10 @@ impl<'m> Tachometer<'m> {
         }
         if self.settings.roi.is_some_and(|roi| !roi.contains(event.x, event.y)) {
             self.ignored.out_of_roi += 1;
+            return;
+        }
+        if event.t_us > LATEST_US {
+            self.ignored.out_of_order += 1;
             return;
         }
         if event.t_us < self.last_us && self.started {
@@ -482,7 +488,8 @@ impl<'m> Tachometer<'m> {
             rotors.push(rotor_reading(id, outcome, account.roll_rad_s())).ok();
         }
         rotors.sort_unstable_by_key(|rotor| rotor.id);
-        let lost = account.lost as f32 > MOST_LOST * (account.counted + account.lost) as f32;
+        let lost =
+            account.lost as f32 > MOST_LOST * account.counted.saturating_add(account.lost) as f32;
         let status = if account.counted == 0 {
             Status::Refused(Reason::NoEvents)
         } else if account.counted < LEAST_EVENTS {
