@@ -1,1 +1,106 @@
 //! Helpers shared by the tests that cross crates.
+
+use std::env;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use evtach_core::{Event, Geometry, Reading, RotorReading, Settings};
+use evtach_host::measure::{Capacity, Summary, measure_events, summarise};
+use evtach_host::recording::{self, OpenOptions, RecordingError};
+
+/// Writes a table to the test's output, past libtest, which shows what `println!` writes for failed tests only.
+pub fn show(text: &str) {
+    // Nobody reads it where stdout is closed: no reason to fail.
+    let _ = io::stdout().lock().write_all(format!("{text}\n").as_bytes());
+}
+
+/// Folder of the recordings that are not part of the project, where it is present: `EVTACH_RECORDINGS`, else
+/// `../shared/recordings` beside the project. Without it prints "skipped".
+#[must_use]
+pub fn recordings(sub: &str) -> Option<PathBuf> {
+    let folder = env::var_os("EVTACH_RECORDINGS").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/recordings"),
+        PathBuf::from,
+    );
+    let folder = folder.join(sub);
+    if !folder.is_dir() {
+        show(&format!("skipped: no recordings ({})", folder.display()));
+        return None;
+    }
+    Some(folder)
+}
+
+/// A recording in memory.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// Size of the sensor.
+    pub geometry: Geometry,
+    /// Its events.
+    pub events: Vec<Event>,
+}
+
+/// Reads a recording as `evtach measure` opens it: nothing given by hand.
+///
+/// # Errors
+/// When it is no recording, or damaged.
+pub fn load(path: &Path) -> Result<Loaded, RecordingError> {
+    let mut recording = recording::open(path, &OpenOptions::default())?;
+    let mut events = Vec::new();
+    while recording.read_chunk(&mut events)? {}
+    Ok(Loaded { geometry: recording.geometry, events })
+}
+
+/// Measures as `evtach measure` does: the series, and the reading over all of it.
+#[must_use]
+pub fn measure(loaded: &Loaded, capacity: Capacity) -> (Vec<Reading>, Summary) {
+    let settings = Settings::new(loaded.geometry);
+    let (readings, _) = measure_events(&loaded.events, &[], settings, capacity);
+    let first_us = loaded.events.first().map_or(0, |event| event.t_us);
+    let last_us = loaded.events.last().map_or(0, |event| event.t_us);
+    let middle_us = first_us + last_us.saturating_sub(first_us) / 2;
+    let summary = summarise(&readings, middle_us, settings.clock_sigma_ppm);
+    (readings, summary)
+}
+
+/// What is true of a rotor.
+#[derive(Clone, Copy, Debug)]
+pub struct Truth {
+    /// Mean place of the centre in pixels.
+    pub centre_px: [f64; 2],
+    /// Radius of the tips in pixels.
+    pub radius_px: f64,
+    /// Blades.
+    pub blades: u8,
+    /// Mean speed as the camera sees it in rpm, positive clockwise on the screen.
+    pub rpm_camera: f64,
+    /// Mean speed relative to the room in rpm, same sign.
+    pub rpm_room: f64,
+}
+
+/// Pairs every true rotor with the measured one nearest to its centre, not farther than half its radius.
+/// Measured rotors that are left over stand in the second list: ghosts.
+#[must_use]
+pub fn pair<'r>(
+    truths: &[Truth],
+    summary: &'r Summary,
+) -> (Vec<Option<&'r RotorReading>>, Vec<&'r RotorReading>) {
+    let mut left: Vec<&RotorReading> =
+        summary.rotors.iter().filter(|rotor| rotor.speed.is_some()).collect();
+    let paired = truths
+        .iter()
+        .map(|truth| {
+            let distance = |rotor: &RotorReading| {
+                let (dx, dy) = (
+                    f64::from(rotor.x_px) - truth.centre_px[0],
+                    f64::from(rotor.y_px) - truth.centre_px[1],
+                );
+                dx.hypot(dy)
+            };
+            let nearest = (0..left.len())
+                .filter(|i| distance(left[*i]) < truth.radius_px / 2.0)
+                .min_by(|a, b| distance(left[*a]).total_cmp(&distance(left[*b])))?;
+            Some(left.swap_remove(nearest))
+        })
+        .collect();
+    (paired, left)
+}

@@ -13,7 +13,7 @@ pub const DEVICE_HEAT_CELLS: usize = 6_400;
 pub const MAX_CLUSTERS: usize = 8;
 
 /// Lines of the spectrum that are looked into: each costs a coherence map.
-pub const MAX_LINES: usize = 8;
+pub const MAX_LINES: usize = 16;
 
 /// Events of one rotor in polar coordinates: 3 072 x 8 B = 24 KiB.
 pub const POLAR_EVENTS: usize = 3_072;

@@ -232,11 +232,11 @@ pub struct RotorReading {
 pub struct Evidence {
     /// Events of this rotor in the window that were used.
     pub events: u32,
-    /// Scan over angular harmonic and frequency: speed in rad/s.
+    /// Scan over frequency and angular harmonic: speed in rad/s.
     pub scan_rad_s: Option<f32>,
-    /// Peak of the scan over its background, as a power ratio.
+    /// Power of the scan's line over what unrelated events would give.
     pub scan_score: Option<f32>,
-    /// Power at the opposite sense of rotation relative to the peak: 1 for flicker and vibration, near 0 for a rotor.
+    /// Share in step of the second best harmonic over that of the best: near 1 for flicker and vibration.
     pub scan_standing: Option<f32>,
     /// Share of the rotor's events that keep step with it, 0 to 1.
     pub coherence: Option<f32>,

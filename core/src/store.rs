@@ -22,7 +22,8 @@ pub struct StoredEvent {
     /// Low 32 bits of the sensor time in microseconds: differences within a window are exact.
     t_us: u32,
     x: u16,
-    y_polarity: u16,
+    /// Row, weight and polarity.
+    y_weight_polarity: u16,
 }
 
 /// Eighths of a segment that keep consecutive events.
@@ -31,11 +32,32 @@ const DENSE_EIGHTHS: usize = 2;
 const BURST_EIGHTHS: usize = 5;
 
 const POLARITY_BIT: u16 = 0x8000;
+/// Rows fit 11 bits ([`crate::Geometry::MAX_PX`]); the four above hold the weight.
+const ROW_BITS: u16 = 11;
+const ROW_MASK: u16 = (1 << ROW_BITS) - 1;
+const WEIGHT_MASK: u16 = 0xF << ROW_BITS;
+const MOST_WEIGHT_LOG2: u8 = 15;
 
 impl StoredEvent {
-    fn pack(event: &Event) -> Self {
+    fn pack(event: &Event, weight_log2: u8) -> Self {
         let polarity = if event.polarity == Polarity::On { POLARITY_BIT } else { 0 };
-        Self { t_us: event.t_us as u32, x: event.x, y_polarity: event.y | polarity }
+        let packed = Self {
+            t_us: event.t_us as u32,
+            x: event.x,
+            y_weight_polarity: (event.y & ROW_MASK) | polarity,
+        };
+        packed.weighing(weight_log2)
+    }
+
+    fn weighing(self, weight_log2: u8) -> Self {
+        let weight = u16::from(weight_log2.min(MOST_WEIGHT_LOG2)) << ROW_BITS;
+        Self { y_weight_polarity: (self.y_weight_polarity & !WEIGHT_MASK) | weight, ..self }
+    }
+
+    /// How many events this one stands for, as a power of two: the others were thinned.
+    #[must_use]
+    pub const fn weight_log2(self) -> u8 {
+        ((self.y_weight_polarity & WEIGHT_MASK) >> ROW_BITS) as u8
     }
 
     /// Column in pixels.
@@ -47,13 +69,13 @@ impl StoredEvent {
     /// Row in pixels.
     #[must_use]
     pub const fn y(self) -> u16 {
-        self.y_polarity & !POLARITY_BIT
+        self.y_weight_polarity & ROW_MASK
     }
 
     /// Whether the pixel became brighter.
     #[must_use]
     pub const fn is_on(self) -> bool {
-        self.y_polarity & POLARITY_BIT != 0
+        self.y_weight_polarity & POLARITY_BIT != 0
     }
 
     /// Time since `origin_us` in microseconds.
@@ -185,96 +207,86 @@ impl<'m> Store<'m> {
             // Halve the reservoir: every other event goes, those kept stay evenly spread.
             let reservoir = &mut self.events[base + burst..base + self.capacity];
             let kept = reservoir.len() / 2;
-            for i in 0..kept {
-                reservoir[i] = reservoir[2 * i];
-            }
             self.thinned += (segment.len - burst - kept) as u64;
             segment.len = burst + kept;
-            segment.stride_log2 += 1;
-        }
-        if let Some(place) = self.events.get_mut(base + segment.len) {
-            *place = StoredEvent::pack(event);
-            segment.len += 1;
+            segment.stride_log2 = (segment.stride_log2 + 1).min(MOST_WEIGHT_LOG2);
+            for i in 0..kept {
+                reservoir[i] = reservoir[2 * i].weighing(segment.stride_log2);
+            }
         }
         let stride_log2 = match segment.len.checked_div(octave).unwrap_or(0) {
             0..DENSE_EIGHTHS => 0,
             eighth if eighth < BURST_EIGHTHS => (eighth - DENSE_EIGHTHS + 1) as u8,
             _ => segment.stride_log2,
         };
-        segment.skip = (1_u32 << stride_log2.min(31)) - 1;
+        if let Some(place) = self.events.get_mut(base + segment.len) {
+            *place = StoredEvent::pack(event, stride_log2);
+            segment.len += 1;
+        }
+        segment.skip = (1_u32 << stride_log2) - 1;
     }
 
     /// Counts events lost before they reached the store.
     pub fn lost(&mut self, count: u64) {
         let slot = self.slot(self.closed);
-        self.segments[slot].lost += count;
+        self.segments[slot].lost = self.segments[slot].lost.saturating_add(count);
     }
 
     /// Makes segments longer, keeping what is stored: each new segment keeps the burst of the first old one in
-    /// it and thins the rest evenly. `segment_us` is at least the length so far. Cost: one pass over the store.
+    /// it, and of the rest every event that stands for as many as the new reservoir's stride says.
+    /// `segment_us` is at least the length so far. Cost: two passes over the store.
     pub fn lengthen(&mut self, segment_us: u32) {
-        let old = core::array::from_fn::<Segment, SEGMENTS, _>(|i| self.segments[self.slot(i)]);
+        let old: [Segment; SEGMENTS] = core::array::from_fn(|i| self.segments[self.slot(i)]);
         let old_us = u64::from(self.segment_us);
-        let elapsed_us = self.closed as u64 * old_us;
-        let burst = BURST_EIGHTHS * (self.capacity / 8);
-        let reservoir = self.capacity - burst;
-        let closed = (elapsed_us / u64::from(segment_us)) as usize;
-        // Reading runs ahead of writing: new segments start no earlier than old ones and hold fewer events.
+        let closed = (self.closed as u64 * old_us / u64::from(segment_us)) as usize;
+        // Reading runs ahead of writing: new segments start no earlier than old ones and hold no more events.
         let (mut from, mut index) = (0, 0);
         for new in 0..=closed {
-            let end_us = (new as u64 + 1) * u64::from(segment_us);
-            let rest: usize = old
-                .iter()
-                .enumerate()
-                .take(self.closed + 1)
-                .skip(from)
-                .take_while(|(i, _)| (*i as u64 * old_us) < end_us)
-                .map(|(_, segment)| segment.len)
-                .sum();
-            let stride = rest.saturating_sub(index + burst).div_ceil(reservoir.max(1)).max(1);
-            let mut merged = Segment {
-                stride_log2: old[self.closed].stride_log2 + stride.ilog2() as u8,
-                ..Segment::default()
-            };
+            let end_us = ((new as u64 + 1) * u64::from(segment_us)).min(i32::MAX as u64) as i32;
+            let mut merged = self.plan_merge(&old, (from, index), end_us);
+            let stride = 1_u64 << merged.stride_log2;
+            let first = from;
+            let (mut passed, mut next) = (0_u64, 0_u64);
             let base = self.slot(new) * self.capacity;
-            let mut passed = 0;
             while from <= self.closed {
-                let source = self.slot(from) * self.capacity;
-                let segment = old[from];
-                // An old segment that is split gives each part of its count as it gives events.
-                let share =
-                    |index: usize| segment.counted * index as u64 / segment.len.max(1) as u64;
+                let (source, segment) = (self.slot(from) * self.capacity, old[from]);
                 let before = index;
-                let mut ended = false;
-                while index < old[from].len {
+                while index < segment.len {
                     let event = self.events[source + index];
-                    if event.since(self.start_us) as i64 >= end_us as i64 {
-                        ended = true;
+                    if event.since(self.start_us) >= end_us {
                         break;
                     }
                     index += 1;
-                    let kept = merged.len < burst || passed % stride == 0;
-                    passed += usize::from(merged.len >= burst);
+                    let in_burst = from == first && merged.len < self.burst();
+                    let kept = in_burst || passed >= next;
+                    if !in_burst {
+                        passed += 1 << event.weight_log2();
+                    }
                     if kept && merged.len < self.capacity {
-                        self.events[base + merged.len] = event;
+                        if !in_burst {
+                            next += stride;
+                        }
+                        let weight =
+                            if in_burst { event.weight_log2() } else { merged.stride_log2 };
+                        self.events[base + merged.len] = event.weighing(weight);
                         merged.len += 1;
                     } else {
                         self.thinned += 1;
                     }
                 }
+                // An old segment that is split gives each part of its count as it gives events.
+                let share =
+                    |index: usize| segment.counted * index as u64 / segment.len.max(1) as u64;
                 merged.counted += share(index) - share(before);
-                if ended {
+                if index < segment.len {
                     break;
                 }
-                if segment.len == 0 {
-                    merged.counted += segment.counted;
-                }
-                from += 1;
-                index = 0;
+                merged.counted += if segment.len == 0 { segment.counted } else { 0 };
+                (from, index) = (from + 1, 0);
             }
             for (i, segment) in old.iter().enumerate().take(self.closed + 1) {
                 if (i as u64 * old_us) / u64::from(segment_us) == new as u64 {
-                    merged.lost += segment.lost;
+                    merged.lost = merged.lost.saturating_add(segment.lost);
                     merged.roll_sum_rad_s += segment.roll_sum_rad_s;
                     merged.roll_count += segment.roll_count;
                 }
@@ -284,6 +296,38 @@ impl<'m> Store<'m> {
         }
         self.closed = closed;
         self.segment_us = segment_us;
+    }
+
+    /// An empty segment whose stride lets the reservoir hold what comes after the first burst and before `end_us`.
+    fn plan_merge(
+        &self,
+        old: &[Segment; SEGMENTS],
+        (from, index): (usize, usize),
+        end_us: i32,
+    ) -> Segment {
+        let mut weight = 0_u64;
+        let mut stride_log2 = Segment::default().stride_log2;
+        for i in from..=self.closed {
+            let source = self.slot(i) * self.capacity;
+            let skipped = if i == from { index + self.burst() } else { 0 };
+            for event in &self.events[source..source + old[i].len][skipped.min(old[i].len)..] {
+                if event.since(self.start_us) >= end_us {
+                    break;
+                }
+                weight += 1 << event.weight_log2();
+                stride_log2 = stride_log2.max(event.weight_log2());
+            }
+        }
+        let room = (self.capacity - self.burst()).max(1) as u64;
+        while weight >> stride_log2 >= room && stride_log2 < MOST_WEIGHT_LOG2 {
+            stride_log2 += 1;
+        }
+        Segment { stride_log2, ..Segment::default() }
+    }
+
+    /// Events of a segment that come before its reservoir.
+    const fn burst(&self) -> usize {
+        BURST_EIGHTHS * (self.capacity / 8)
     }
 
     /// Takes in the camera's roll rate, positive = the scene turns clockwise on the screen.
@@ -338,7 +382,7 @@ impl<'m> Store<'m> {
             let segment = &self.segments[self.slot(index)];
             account.counted += segment.counted;
             account.kept += segment.len as u64;
-            account.lost += segment.lost;
+            account.lost = account.lost.saturating_add(segment.lost);
             account.roll_sum_rad_s += segment.roll_sum_rad_s;
             account.roll_count += segment.roll_count;
         }
@@ -385,6 +429,36 @@ impl<'a> Window<'a> {
     pub fn events(&self) -> impl Iterator<Item = StoredEvent> + use<'a> {
         let parts = self.parts;
         parts.into_iter().take(self.segments).flat_map(|part| part.iter().copied())
+    }
+
+    /// Events that each stand for the same number of arrived ones, at most `most` of those for which `inside` gives a value.
+    ///
+    /// The stored events are dense at the start of each segment; whoever looks for frequencies must not take
+    /// that rhythm for one of the scene.
+    pub fn even<T: Copy>(
+        &self,
+        most: usize,
+        inside: impl Fn(StoredEvent) -> Option<T>,
+    ) -> impl Iterator<Item = (StoredEvent, T)> {
+        let (mut weight, mut coarsest) = (0_u64, 0);
+        for event in self.events() {
+            if inside(event).is_some() {
+                weight += 1 << event.weight_log2();
+                coarsest = coarsest.max(event.weight_log2());
+            }
+        }
+        // Fixed-point, so that any ratio thins evenly.
+        let stride = ((weight << 8) / most.max(1) as u64 + 1).max(1 << (coarsest + 8));
+        let (mut passed, mut next) = (0_u64, 0_u64);
+        self.events().filter_map(move |event| {
+            let value = inside(event)?;
+            let kept = passed >= next;
+            passed += 1 << (event.weight_log2() + 8);
+            if kept {
+                next += stride;
+            }
+            kept.then_some((event, value))
+        })
     }
 
     /// Number of stored events.
@@ -456,6 +530,23 @@ mod tests {
         assert!(*kept.last().unwrap_or(&0) > 4_500);
         let account = store.account(1);
         assert_eq!((account.counted, account.kept), (5_000, kept.len() as u64));
+    }
+
+    #[test]
+    fn even_events_stand_for_the_same_number_each() {
+        let mut memory = [StoredEvent::default(); 64 * SEGMENTS];
+        let mut store = Store::new(&mut memory, 10_000);
+        fill(&mut store, 0..60_000);
+        let kept: Vec<_> = store
+            .window(6, u64::MAX)
+            .even(100, |event| Some(event.since(0)))
+            .map(|(_, t_us)| t_us)
+            .collect();
+        assert!(kept.len() > 80 && kept.len() <= 101, "{}", kept.len());
+        // The reservoir itself comes in steps of 512.
+        assert!(kept.windows(2).all(|pair| (1..=1_024).contains(&(pair[1] - pair[0]))));
+        let first_half = kept.iter().filter(|t_us| **t_us < 30_000).count();
+        assert!(first_half.abs_diff(kept.len() - first_half) <= 2);
     }
 
     #[test]

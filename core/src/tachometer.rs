@@ -50,6 +50,8 @@ const MOST_LOST: f32 = 0.5;
 const MOST_MEASURED: usize = 12;
 /// Time going back by more than this restarts the window; less is disorder, and the event is left out.
 const CLOCK_RESET_US: u64 = 1_000_000;
+/// Latest sensor time that is believed: beyond it (292 000 years) sums of times could overflow.
+const LATEST_US: u64 = u64::MAX / 2;
 /// Standard deviation of a gyro's zero-rate offset in rad/s, calibrated on a still camera.
 const GYRO_OFFSET_RAD_S: f32 = 3e-3;
 
@@ -128,7 +130,7 @@ pub struct Ignored {
     pub out_of_bounds: u64,
     /// Outside the region of interest.
     pub out_of_roi: u64,
-    /// Older than the event before.
+    /// Older than the event before, or from a future that no clock reaches.
     pub out_of_order: u64,
     /// Arrived while a measurement held the store for too long; the window was given up.
     pub overrun: u64,
@@ -227,6 +229,10 @@ impl<'m> Tachometer<'m> {
             self.ignored.out_of_roi += 1;
             return;
         }
+        if event.t_us > LATEST_US {
+            self.ignored.out_of_order += 1;
+            return;
+        }
         if event.t_us < self.last_us && self.started {
             if self.last_us - event.t_us < CLOCK_RESET_US {
                 self.ignored.out_of_order += 1;
@@ -296,7 +302,7 @@ impl<'m> Tachometer<'m> {
         self.outcomes.clear();
         self.in_step_hz = None;
         weigh_heat(self.heat.counts(), self.weights);
-        let known = self.tracker.known().iter().filter(|known| known.is_fresh());
+        let known = self.tracker.known().iter().filter(|known| known.can_be_followed());
         for known in known {
             self.candidates.push((known.found, Some((known.parts, known.alike)))).ok();
         }
@@ -405,9 +411,7 @@ impl<'m> Tachometer<'m> {
                     blades: self.settings.blades,
                     clock_sigma_ppm: self.settings.clock_sigma_ppm,
                 };
-                let done =
-                    measurement.step(&window, &stated, &mut self.polar, &mut self.scanner, icp);
-                if !done {
+                if !measurement.step(&window, &stated, &mut self.polar, icp) {
                     return false;
                 }
                 let (index, outcome) = (*index, measurement.result());
@@ -484,7 +488,8 @@ impl<'m> Tachometer<'m> {
             rotors.push(rotor_reading(id, outcome, account.roll_rad_s())).ok();
         }
         rotors.sort_unstable_by_key(|rotor| rotor.id);
-        let lost = account.lost as f32 > MOST_LOST * (account.counted + account.lost) as f32;
+        let lost =
+            account.lost as f32 > MOST_LOST * account.counted.saturating_add(account.lost) as f32;
         let status = if account.counted == 0 {
             Status::Refused(Reason::NoEvents)
         } else if account.counted < LEAST_EVENTS {

@@ -3,6 +3,7 @@
 use heapless::Vec;
 
 use crate::limits::MAX_ROTORS;
+use crate::reading::Status;
 use crate::rotors::{Disc, Found};
 use crate::speed::measurement::Outcome;
 
@@ -20,15 +21,17 @@ pub struct Known {
     pub parts: Option<u8>,
     /// Whether the parts are alike.
     pub alike: bool,
-    /// Readings since it was last measured; 0 = in the last one.
+    /// Whether it was locked when last seen.
+    locked: bool,
+    /// Readings since it was last seen; 0 = in the last one.
     missed: u8,
 }
 
 impl Known {
-    /// Whether the last reading measured it, so that it can be followed.
+    /// Whether the last reading locked it, so that it can be followed: what was only suspected is not.
     #[must_use]
-    pub const fn is_fresh(&self) -> bool {
-        self.missed == 0
+    pub const fn can_be_followed(&self) -> bool {
+        self.missed == 0 && self.locked
     }
 }
 
@@ -56,6 +59,7 @@ impl Tracker {
     /// The letter of a rotor: that of the nearest known one within half a radius, else the first free.
     pub fn identify(&mut self, outcome: &Outcome) -> u8 {
         let disc = outcome.found.disc;
+        let locked = outcome.status == Status::Locked;
         let near = |known: &Disc| {
             let reach = 0.5 * disc.radius_px.max(known.radius_px);
             disc.distance2(known) < reach * reach
@@ -68,6 +72,7 @@ impl Tracker {
             known.found = outcome.found;
             known.parts = outcome.parts;
             known.alike = outcome.alike;
+            known.locked = locked;
             known.missed = 0;
             return known.id;
         }
@@ -80,7 +85,7 @@ impl Tracker {
             self.known.swap_remove(oldest);
         }
         let (parts, alike) = (outcome.parts, outcome.alike);
-        self.known.push(Known { id, found: outcome.found, parts, alike, missed: 0 }).ok();
+        self.known.push(Known { id, found: outcome.found, parts, alike, locked, missed: 0 }).ok();
         id
     }
 }

@@ -80,10 +80,10 @@ impl<C: Clock> Costs<C> {
     }
 
     /// Polls once.
-    pub fn poll(&mut self, tachometer: &mut Tachometer<'_>, budget: u32) -> Poll {
-        let stage = stage(tachometer);
+    pub fn poll(&mut self, tachometer: &mut Tachometer<'_>, steps: u32) -> Poll {
+        let stage = tachometer.stage();
         let start = self.clock.ticks();
-        let poll = tachometer.poll(budget);
+        let poll = tachometer.poll(steps);
         let ticks = self.clock.ticks() - start;
         if self.stages.get(&stage).is_none() {
             // With more names than places the rest goes uncounted by stage; the sum still holds.
@@ -113,8 +113,4 @@ impl<C> fmt::Display for Costs<C> {
         }
         Ok(())
     }
-}
-
-fn stage(_tachometer: &Tachometer<'_>) -> &'static str {
-    "all"
 }

@@ -1,54 +1,72 @@
-//! Measuring: blocks of events in, readings out, in pieces short enough that intake never waits.
+//! Measuring: blocks of records in, readings out, in steps short enough that intake need not wait.
 
 use embassy_futures::yield_now;
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_sync::zerocopy_channel::Receiver;
-use evtach_core::{Poll, Reading, Tachometer};
+use evtach_core::{Event, Poll, Reading, Tachometer};
+use heapless::Vec;
 
 use crate::cost::{Clock, Costs, Spent};
-use crate::intake::{Block, Pace};
+use crate::intake::{BLOCK_EVENTS, Block, Pace};
+use crate::record::{Decoder, Header};
 
-/// Point operations in one piece of a measurement: at about 100 instructions each, 0.1 ms at 216 MHz.
-pub const BUDGET: u32 = 200;
+/// Steps of a measurement between two looks at what has arrived.
+pub const STEPS: u32 = 1;
+
+/// Where blocks are turned into events and pushed.
+struct Intake<'t, 'm, C> {
+    tachometer: &'t mut Tachometer<'m>,
+    decoder: Decoder,
+    costs: &'t mut Costs<C>,
+    ended: bool,
+}
+
+impl<C: Clock> Intake<'_, '_, C> {
+    fn push(&mut self, block: &Block) {
+        if block.lost > 0 {
+            self.tachometer.lost(block.lost);
+        }
+        let events: Vec<Event, BLOCK_EVENTS> =
+            block.records.iter().map(|&record| self.decoder.decode(record)).collect();
+        self.costs.push(self.tachometer, &events);
+        self.ended |= block.last;
+    }
+}
 
 /// Measures until the last block, and hands every reading to `show` with what it cost.
 pub async fn measure<M: RawMutex>(
     tachometer: &mut Tachometer<'_>,
+    header: &Header,
     blocks: &mut Receiver<'_, M, Block>,
     pace: Pace,
     costs: &mut Costs<impl Clock>,
     mut show: impl FnMut(&Reading, Spent),
 ) {
-    let mut last = false;
-    while !last {
-        last = push(tachometer, blocks.receive().await, costs);
-        blocks.receive_done();
+    let decoder = Decoder::new(header.first_us);
+    let mut intake = Intake { tachometer, decoder, costs, ended: false };
+    let mut finished = false;
+    while !finished {
+        if intake.ended {
+            intake.tachometer.finish();
+            finished = true;
+        } else {
+            intake.push(blocks.receive().await);
+            blocks.receive_done();
+        }
         loop {
-            match costs.poll(tachometer, BUDGET) {
+            match intake.costs.poll(intake.tachometer, STEPS) {
                 Poll::Idle => break,
                 Poll::Pending => {}
-                Poll::Ready(reading) => show(&reading, costs.take_spent()),
+                Poll::Ready(reading) => show(&reading, intake.costs.take_spent()),
             }
             // A sensor goes on while a window is measured; a file waits, and is measured to the end.
             while pace == Pace::Sensor
                 && let Some(block) = blocks.try_receive()
             {
-                last |= push(tachometer, block, costs);
+                intake.push(block);
                 blocks.receive_done();
             }
             yield_now().await;
         }
     }
-}
-
-/// Takes a block in and tells whether it was the last.
-fn push(tachometer: &mut Tachometer<'_>, block: &Block, costs: &mut Costs<impl Clock>) -> bool {
-    if block.lost > 0 {
-        tachometer.lost(block.lost);
-    }
-    costs.push(tachometer, &block.events);
-    if block.last {
-        tachometer.finish();
-    }
-    block.last
 }

@@ -23,6 +23,9 @@ use evtach_core::{Event, Geometry, Polarity};
 /// Bytes of one record.
 pub const RECORD_BYTES: usize = 8;
 
+/// One event as eight bytes.
+pub type Record = [u8; RECORD_BYTES];
+
 const MAGIC: [u8; 8] = *b"evtach8\n";
 const BRIGHTER: u16 = 0x8000;
 
@@ -96,7 +99,7 @@ impl Header {
 
 /// The record of an event.
 #[must_use]
-pub fn encode(event: &Event) -> [u8; RECORD_BYTES] {
+pub fn encode(event: &Event) -> Record {
     let [t0, t1, t2, t3, ..] = event.t_us.to_le_bytes();
     let [x0, x1] = event.x.to_le_bytes();
     let brighter = if event.polarity == Polarity::On { BRIGHTER } else { 0 };
@@ -118,7 +121,7 @@ impl Decoder {
     }
 
     /// The event of a record. Records may lie up to 35 minutes before or after their predecessor.
-    pub fn decode(&mut self, record: [u8; RECORD_BYTES]) -> Event {
+    pub fn decode(&mut self, record: Record) -> Event {
         let [t0, t1, t2, t3, x0, x1, y0, y1] = record;
         let low = u32::from_le_bytes([t0, t1, t2, t3]);
         let step = low.wrapping_sub(self.latest_us as u32) as i32;

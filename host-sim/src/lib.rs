@@ -3,4 +3,5 @@
 pub mod device;
 pub mod measure;
 pub mod recording;
+pub mod report;
 pub mod synth;

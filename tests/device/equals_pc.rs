@@ -3,41 +3,13 @@
 use std::env;
 use std::path::{Path, PathBuf};
 
-use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
-use evtach_core::{
-    Event, Geometry, Memory, Poll, Reading, Settings, Speed, StoredEvent, Tachometer,
-};
+use evtach_core::{Event, Geometry, Poll, Reading, Settings, Speed};
 use evtach_firmware::report::Lines;
 use evtach_host::device::{self, Pace};
+use evtach_host::measure::{Capacity, drain, measure_events, with_tachometer};
 use evtach_host::recording::{self, OpenOptions};
 use evtach_host::synth::scene::Lamp;
 use evtach_host::synth::{self, Rotor, Scene};
-
-/// Plays events to the core here, in the device's capacities but in another rhythm: pieces of other
-/// sizes, and as many measuring steps at once as will go.
-fn readings_on_pc(geometry: Geometry, events: &[Event]) -> Vec<Reading> {
-    let mut store = vec![StoredEvent::default(); DEVICE_EVENTS];
-    let mut heat = vec![0; DEVICE_HEAT_CELLS];
-    let memory = Memory { events: &mut store, heat: &mut heat };
-    let mut tachometer = Tachometer::new(Settings::new(geometry), memory);
-    let mut readings = Vec::new();
-    let mut drain = |tachometer: &mut Tachometer<'_>| {
-        loop {
-            match tachometer.poll(u32::MAX) {
-                Poll::Idle => break,
-                Poll::Pending => {}
-                Poll::Ready(reading) => readings.push(reading),
-            }
-        }
-    };
-    for piece in events.chunks(77) {
-        tachometer.push(piece);
-        drain(&mut tachometer);
-    }
-    tachometer.finish();
-    drain(&mut tachometer);
-    readings
-}
 
 /// Compares the two line by line and returns the readings; `None` without QEMU.
 fn compare(name: &str, geometry: Geometry, events: &[Event]) -> Option<Vec<Reading>> {
@@ -48,7 +20,8 @@ fn compare(name: &str, geometry: Geometry, events: &[Event]) -> Option<Vec<Readi
     }
     let image = device::build().expect("the firmware builds");
     let output = device::run(&image, geometry, events, Pace::File).expect("the firmware runs");
-    let readings = readings_on_pc(geometry, events);
+    // The same capacities, but another rhythm: pieces of another size, each measured in one go.
+    let (readings, _) = measure_events(events, &[], Settings::new(geometry), Capacity::Device);
     assert!(!readings.is_empty(), "{name}: {} events and no reading", events.len());
     for (index, (here, there)) in readings.iter().zip(&output.readings).enumerate() {
         let here = Lines(here).to_string();
@@ -133,5 +106,39 @@ fn real_recordings() {
         let mut events = Vec::new();
         while recording.read_chunk(&mut events).expect("an undamaged recording") {}
         compare(name, recording.geometry, &events);
+    }
+}
+
+/// The device measures a step at a time while events go on arriving; when that happens must not show.
+#[test]
+fn readings_do_not_depend_on_when_the_measurement_ran() {
+    let rotor = Rotor { blades: 3, rpm: 1200.0, ..Rotor::default() };
+    let scene = Scene { duration_ms: 400.0, rotors: vec![rotor], ..Scene::default() };
+    let (geometry, events) = synthesise(&scene);
+    let settings = Settings::new(geometry);
+    let (at_once, _) = measure_events(&events, &[], settings, Capacity::Device);
+    for (piece, steps) in [(1, u32::MAX), (16, 1), (64, 1), (128, 1), (256, 2)] {
+        let (late, overrun) = with_tachometer(settings, Capacity::Device, |tachometer| {
+            let mut readings = Vec::new();
+            for piece in events.chunks(piece) {
+                tachometer.push(piece);
+                if let Poll::Ready(reading) = tachometer.poll(steps) {
+                    readings.push(reading);
+                }
+            }
+            drain(tachometer, |reading| readings.push(reading));
+            tachometer.finish();
+            drain(tachometer, |reading| readings.push(reading));
+            (readings, tachometer.ignored().overrun)
+        });
+        assert_eq!(overrun, 0, "{piece} events a step leave no time to measure");
+        assert_eq!(late.len(), at_once.len(), "{piece} events, {steps} steps");
+        for (late, at_once) in late.iter().zip(&at_once) {
+            assert_eq!(
+                Lines(late).to_string(),
+                Lines(at_once).to_string(),
+                "{piece} events, {steps} steps"
+            );
+        }
     }
 }

@@ -1,8 +1,8 @@
-//! Discs: places where a rotor may turn, and how round the heat around them is.
+//! Discs: places where a rotor may turn.
 
-use super::heat::CellGrid;
-use super::kmeans::{Cluster, nearest, weighted_cells};
-use crate::math::{Turn, sqrt};
+use super::heat::Cells;
+use super::kmeans::{Cluster, nearest};
+use crate::math::sqrt;
 
 /// Distance of outliers in median distances (paper, "Outliers Removal").
 const OUTLIER_MEDIANS: f32 = 3.0;
@@ -12,8 +12,6 @@ const OUTLIER_PASSES: u8 = 3;
 const CLASSES: usize = 128;
 /// Share of the weight inside the radius.
 const RADIUS_QUANTILE: f32 = 0.97;
-/// Angular harmonics in the roundness.
-const HARMONICS: usize = 6;
 
 /// A place where a rotor may turn.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,30 +41,12 @@ impl Disc {
     }
 }
 
-/// A disc with the grounds to believe in it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Candidate {
-    /// Where.
-    pub disc: Disc,
-    /// Power of the angular harmonics 1 to 6 of its heat: 0 for a rotor seen whole, 0.3 and more for a
-    /// rotor cut in two or two rotors taken for one.
-    pub lopsided: f32,
-    /// Weight of its cells.
-    pub mass: f32,
-}
-
-/// Turns cluster `index` into a disc: removes outliers beyond three median distances, then takes centroid,
-/// radius and roundness of what remains. `None` when nothing remains.
+/// Turns cluster `index` into a disc: removes outliers beyond three median distances, then takes centroid and
+/// radius of what remains. `None` when nothing remains.
 #[must_use]
-pub fn candidate(
-    grid: CellGrid,
-    weights: &[u8],
-    clusters: &[Cluster],
-    index: usize,
-) -> Option<Candidate> {
-    let members = || {
-        weighted_cells(grid, weights).filter(move |(x, y, _)| nearest(clusters, *x, *y).0 == index)
-    };
+pub fn without_outliers(cells: Cells<'_>, clusters: &[Cluster], index: usize) -> Option<Disc> {
+    let grid = cells.grid;
+    let members = || cells.iter().filter(move |(x, y, _)| nearest(clusters, *x, *y).0 == index);
     let cluster = clusters.get(index)?;
     let (mut x_px, mut y_px) = (cluster.x_px, cluster.y_px);
     let mut limit2 = f32::MAX;
@@ -97,37 +77,7 @@ pub fn candidate(
     let limit = (sqrt(limit2) / grid.cell_px()) as usize;
     classes[(limit + 1).min(CLASSES)..].fill(0.0);
     let radius_px = quantile(&classes, RADIUS_QUANTILE) * grid.cell_px();
-    let disc = Disc { x_px, y_px, radius_px };
-    let (lopsided, mass) = roundness(disc, members());
-    Some(Candidate { disc, lopsided, mass })
-}
-
-/// Power of the angular harmonics of the heat around a disc's centre, and its weight.
-fn roundness(disc: Disc, cells: impl Iterator<Item = (f32, f32, f32)>) -> (f32, f32) {
-    let mut sums = [(0.0_f32, 0.0_f32); HARMONICS];
-    let (mut mass, mut outer_mass) = (0.0, 0.0);
-    let reach2 = disc.radius_px * disc.radius_px * 1.21;
-    for (x, y, weight) in cells {
-        let (dx, dy) = (x - disc.x_px, y - disc.y_px);
-        let r2 = dx * dx + dy * dy;
-        if r2 > reach2 {
-            continue;
-        }
-        mass += weight;
-        // Near the centre the angle of a cell means little.
-        if r2 < reach2 * 0.09 {
-            continue;
-        }
-        outer_mass += weight;
-        let angle = Turn::of_vector(dy, dx);
-        for (m, sum) in sums.iter_mut().enumerate() {
-            let (sin, cos) = angle.times(m as u32 + 1).sin_cos();
-            sum.0 += weight * cos;
-            sum.1 += weight * sin;
-        }
-    }
-    let power: f32 = sums.iter().map(|(re, im)| re * re + im * im).sum();
-    (power / (outer_mass * outer_mass).max(1.0), mass)
+    Some(Disc { x_px, y_px, radius_px })
 }
 
 /// The quantile of a histogram of distance classes, in classes.
@@ -147,7 +97,9 @@ fn quantile(classes: &[f32; CLASSES], share: f32) -> f32 {
 mod tests {
     use super::*;
 
-    const GRID: CellGrid = CellGrid { columns: 80, rows: 60, cell_log2: 2 };
+    use super::super::heat::CellGrid;
+
+    const GRID: CellGrid = CellGrid { columns: 80, rows: 60, cell_log2: 2, x0: 0, y0: 0 };
 
     fn heat(inside: impl Fn(f32, f32) -> bool) -> [u8; 4800] {
         let mut weights = [0; 4800];
@@ -160,29 +112,17 @@ mod tests {
         weights
     }
 
-    fn one(weights: &[u8]) -> Candidate {
+    fn one(weights: &[u8]) -> Disc {
         let cluster = Cluster { x_px: 150.0, y_px: 120.0, mass: 1.0 };
-        candidate(GRID, weights, &[cluster], 0).unwrap_or_default()
+        let cells = Cells { grid: GRID, weights, floor: 0 };
+        without_outliers(cells, &[cluster], 0).unwrap_or_default()
     }
 
     #[test]
-    fn a_disc_is_round_and_its_radius_is_found() {
+    fn the_radius_of_a_disc_is_found() {
         let weights = heat(|x, y| (x - 150.0).powi(2) + (y - 120.0).powi(2) < 3600.0);
         let found = one(&weights);
-        assert!(found.lopsided < 0.01, "{found:?}");
-        assert!((found.disc.radius_px - 60.0).abs() < 5.0, "{found:?}");
-    }
-
-    #[test]
-    fn half_a_disc_and_a_pair_are_not_round() {
-        let half = heat(|x, y| (x - 150.0).powi(2) + (y - 120.0).powi(2) < 3600.0 && x > 150.0);
-        assert!(one(&half).lopsided > 0.1);
-        let pair = heat(|x, y| {
-            ((x - 110.0).powi(2) + (y - 120.0).powi(2))
-                .min((x - 190.0).powi(2) + (y - 120.0).powi(2))
-                < 900.0
-        });
-        assert!(one(&pair).lopsided > 0.3);
+        assert!((found.radius_px - 60.0).abs() < 5.0, "{found:?}");
     }
 
     #[test]
@@ -191,6 +131,6 @@ mod tests {
             (x - 150.0).powi(2) + (y - 120.0).powi(2) < 900.0 || (x > 300.0 && y < 20.0)
         });
         let found = one(&weights);
-        assert!((found.disc.x_px - 150.0).abs() < 1.0, "{found:?}");
+        assert!((found.x_px - 150.0).abs() < 1.0, "{found:?}");
     }
 }

@@ -13,8 +13,8 @@
 use heapless::Vec;
 
 use super::coherence::{Coherence, Phasor};
-use super::disc::{Candidate, Disc, candidate};
-use super::heat::CellGrid;
+use super::disc::{Disc, without_outliers};
+use super::heat::{CellGrid, Cells};
 use super::kmeans::{Cluster, KMeans, Seeding, davies_bouldin, nearest};
 use super::winding::{Winding, collect, explain};
 use crate::limits::{COHERENCE_CELLS, MAX_CANDIDATES, MAX_CLUSTERS, MAX_LINES};
@@ -23,8 +23,21 @@ use crate::speed::polar::{PolarTrack, track};
 use crate::speed::scan::{Peak, Scanner};
 use crate::store::Window;
 
-/// Angular harmonics in the spectrum of a tile.
-const TILE_HARMONICS: u32 = 3;
+/// How far beside its centre a tile is looked at from, in radii.
+const BESIDE: f32 = 0.5;
+/// Passes over the heat map, and the share of the highest weight that makes a cell hot: a rotor before a moving
+/// background is hotter than all of that, but small.
+const PASSES: u8 = 2;
+const HOT_SHARE: f32 = 0.55;
+/// Half the side of a local map in radii of its tile, and at least in pixels.
+const LOCAL_SHARE: f32 = 1.6;
+const LEAST_LOCAL_PX: f32 = 24.0;
+/// Lines nearer to each other than this, in lines of the spectrum, are the same.
+const SAME_LINE: f32 = 0.5;
+/// Least share of its disc that a rotor's phasors cover: a mark on a rim sweeps a fifth.
+const LEAST_COVER: f32 = 0.08;
+/// Tiles with the same line nearer to each other than this, in sums of their radii, show the same rotor.
+const SAME_PLACE: f32 = 2.0;
 /// Power of a line over the mean of its spectrum below which it is noise.
 const LEAST_LINE_POWER: f32 = 12.0;
 /// Floor under the heat map, as a share of its reference.
@@ -51,20 +64,31 @@ pub struct Found {
     pub omega_rad_s: f32,
     /// Angular harmonic of the line it was found by: a multiple of the blade count, or less with an odd blade.
     pub windings: u32,
+    /// Frequency of that line in Hz.
+    pub line_hz: f32,
     /// Share of the coherence map it explains.
     pub share: f32,
     /// Events in step that it explains.
     pub explained: f32,
 }
 
+/// A line of the spectrum and the tile it was seen in.
+#[derive(Clone, Copy, Debug, Default)]
+struct Line {
+    line_hz: f32,
+    power: f32,
+    tile: Disc,
+}
+
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Stage {
     #[default]
-    Weigh,
+    Seed,
     Tiles,
     Spectrum,
     Map,
     Split,
+    Local,
     Done,
 }
 
@@ -74,14 +98,17 @@ pub struct Extraction {
     stage: Stage,
     kmeans: KMeans,
     tile: usize,
-    lines: Vec<Peak, MAX_LINES>,
+    /// Pass over the heat map: hot cells first, then all.
+    pass: u8,
+    tile_disc: Disc,
+    lines: Vec<Line, MAX_LINES>,
     line: usize,
+    /// Grid of the map at hand.
+    grid: CellGrid,
     k: usize,
     /// Clustering with the lowest index so far.
     best_index: f32,
     best: Vec<Cluster, MAX_CLUSTERS>,
-    /// What one rotation explains of the whole map.
-    whole: Option<Found>,
     /// Rotors by every line: the same one may stand here by several of its lines.
     candidates: Vec<Found, MAX_CANDIDATES>,
     in_step_hz: Option<f32>,
@@ -136,33 +163,40 @@ impl Extraction {
         scratch: &mut Scratch,
     ) -> bool {
         match self.stage {
-            Stage::Weigh => {
-                self.kmeans =
-                    KMeans::seed(view.grid, view.weights, MAX_CLUSTERS, Seeding::FarthestNearest);
+            Stage::Seed => {
+                let cells = self.cells(view);
+                self.kmeans = KMeans::seed(cells, MAX_CLUSTERS, Seeding::FarthestNearest);
                 self.stage = Stage::Tiles;
             }
             Stage::Tiles => {
-                if self.kmeans.sweep(view.grid, view.weights) {
+                if self.kmeans.sweep(self.cells(view)) {
+                    self.tile = 0;
                     self.stage = Stage::Spectrum;
                     self.start_tile(view, track, scanner);
                 }
             }
             Stage::Spectrum => self.spectrum(view, track, scanner),
             Stage::Map => self.map(view, scratch),
-            Stage::Split => self.split(view, scratch),
+            Stage::Split => self.split(scratch),
+            Stage::Local => self.local(view, scratch),
             Stage::Done => {}
         }
         self.stage == Stage::Done
     }
 
+    #[doc(hidden)]
+    pub fn debug(&self) -> impl core::fmt::Debug + '_ {
+        &self.lines
+    }
     /// Name of the stage that the next step belongs to.
     #[must_use]
     pub const fn stage(&self) -> &'static str {
         match self.stage {
-            Stage::Weigh | Stage::Tiles => "tiles",
+            Stage::Seed | Stage::Tiles => "tiles",
             Stage::Spectrum => "spectrum",
             Stage::Map => "map",
             Stage::Split => "split",
+            Stage::Local => "local map",
             Stage::Done => "done",
         }
     }
@@ -183,23 +217,34 @@ impl Extraction {
     fn start_tile(&mut self, view: &View<'_>, polar: &mut PolarTrack, scanner: &mut Scanner) {
         scanner.restart();
         polar.clear();
-        let clusters = self.kmeans.clusters();
-        if let Some(tile) = candidate(view.grid, view.weights, clusters, self.tile) {
-            track(&view.window, tile.disc, polar);
+        let tile = without_outliers(self.cells(view), self.kmeans.clusters(), self.tile);
+        self.tile_disc = tile.unwrap_or_default();
+        if let Some(Disc { x_px, y_px, radius_px }) = tile {
+            // Seen from beside its centre: about the centre of n blades all harmonics but n and its multiples are
+            // silent, and n may be higher than what is looked at.
+            let beside = Disc { x_px: x_px + BESIDE * radius_px, y_px, radius_px };
+            track(&view.window, beside, polar);
         }
+    }
+
+    /// The cells of the heat map that this pass tiles.
+    fn cells<'a>(&self, view: &View<'a>) -> Cells<'a> {
+        let top = view.weights.iter().copied().max().unwrap_or(0);
+        let floor = if self.pass == 0 { (f32::from(top) * HOT_SHARE) as u8 } else { 0 };
+        Cells { grid: view.grid, weights: view.weights, floor }
     }
 
     fn spectrum(&mut self, view: &View<'_>, track: &mut PolarTrack, scanner: &mut Scanner) {
         if self.tile >= self.kmeans.clusters().len() {
+            self.pass += 1;
+            self.stage = if self.pass < PASSES { Stage::Seed } else { Stage::Map };
             self.lines.sort_unstable_by(|a, b| b.power.total_cmp(&a.power));
-            self.stage = Stage::Map;
             return;
         }
         let window_us = view.window.duration_us;
-        scanner.step(track, window_us);
-        if scanner.harmonic() >= TILE_HARMONICS {
+        if scanner.step(track, window_us) {
             for peak in scanner.peaks() {
-                self.add_line(*peak, 1.5e6 / window_us as f32);
+                self.add_line(*peak, SAME_LINE * 1e6 / window_us as f32);
             }
             self.tile += 1;
             self.start_tile(view, track, scanner);
@@ -210,72 +255,121 @@ impl Extraction {
         if peak.power < LEAST_LINE_POWER {
             return;
         }
-        let peak = Peak { line_hz: peak.line_hz.abs(), ..peak };
-        let known = |line: &&mut Peak| (line.line_hz - peak.line_hz).abs() < width_hz;
+        let new = Line { line_hz: peak.line_hz.abs(), power: peak.power, tile: self.tile_disc };
+        let known = |line: &&mut Line| {
+            let reach_px = SAME_PLACE * (line.tile.radius_px + new.tile.radius_px);
+            (line.line_hz - new.line_hz).abs() < width_hz
+                && line.tile.distance2(&new.tile) < reach_px * reach_px
+        };
         if let Some(line) = self.lines.iter_mut().find(known) {
-            if peak.power > line.power {
-                *line = peak;
+            if new.power > line.power {
+                *line = new;
             }
-        } else if let Err(peak) = self.lines.push(peak)
+        } else if let Err(new) = self.lines.push(new)
             && let Some(least) = self.lines.iter_mut().min_by(|a, b| a.power.total_cmp(&b.power))
-            && peak.power > least.power
+            && new.power > least.power
         {
-            *least = peak;
+            *least = new;
         }
+    }
+
+    /// Whether a rotor that was found well explains the line of this tile as one of its multiples.
+    fn explained(&self, line: &Line, width_hz: f32) -> bool {
+        self.candidates.iter().filter(|found| found.share >= SHARE_OF_ONE).any(|found| {
+            let turns_hz = found.omega_rad_s.abs() / TAU;
+            let ratio = line.line_hz / turns_hz.max(1e-3);
+            // The rotor's own speed is known to a line over its windings.
+            let slack_hz = width_hz * (1.0 + ratio / found.windings.max(1) as f32);
+            let off_hz = (ratio - libm::roundf(ratio)).abs() * turns_hz;
+            let away2 = found.disc.distance2(&line.tile);
+            off_hz < slack_hz.min(0.25 * turns_hz)
+                && away2 < found.disc.radius_px * found.disc.radius_px
+        })
+    }
+
+    /// The next line, unless it has been looked into over the whole image: then its tile alone is left.
+    fn next_line(&mut self, view: &View<'_>) -> Option<Line> {
+        let width_hz = SAME_LINE * 1e6 / view.window.duration_us as f32;
+        let mut line = *self.lines.get(self.line)?;
+        while self.explained(&line, width_hz) {
+            self.line += 1;
+            line = *self.lines.get(self.line)?;
+        }
+        let seen =
+            self.lines[..self.line].iter().any(|l| (l.line_hz - line.line_hz).abs() < width_hz);
+        if seen {
+            self.stage = Stage::Local;
+        }
+        Some(line)
     }
 
     /// Fills the map of the next line and asks whether one rotation explains it all.
     fn map(&mut self, view: &View<'_>, scratch: &mut Scratch) {
-        let Some(line) = self.lines.get(self.line) else {
+        let Some(line) = self.next_line(view) else {
             // A piece of a rotor, or a rotor by the line of its neighbour, explains fewer events than the rotor by
             // its own line.
             self.candidates.sort_unstable_by(|a, b| b.explained.total_cmp(&a.explained));
             self.stage = Stage::Done;
             return;
         };
-        let line_hz = line.line_hz;
-        let grid = view.map_grid;
-        scratch.coherence.fill(&view.window, grid, line_hz);
-        let map = &mut scratch.map[..grid.len().min(COHERENCE_CELLS)];
-        scratch.coherence.heat(grid, map);
-        let weights = &mut scratch.map_weights[..map.len()];
-        weigh(map, MAP_FLOOR, weights);
-        let mut one = KMeans::seed(grid, weights, 1, Seeding::FarthestMean);
-        one.sweep(grid, weights);
-        self.whole = None;
-        self.best.clear();
-        self.best_index = f32::MAX;
-        let phasors = || scratch.coherence.phasors(grid);
-        if let Some(all) = candidate(grid, weights, one.clusters(), 0)
-            && phasors().count() >= LEAST_PHASORS
-        {
-            let (region, total) = collect(phasors(), |p| inside(p, &all));
-            let winding = explain(&region, all.disc);
-            if winding.windings == 0 && winding.share > SHARE_OF_ONE {
-                self.in_step_hz = self.in_step_hz.or(Some(line_hz));
-            }
-            self.whole = believe(&winding, (&region, total), &all, line_hz);
-        } else {
-            self.line += 1;
+        if self.stage == Stage::Local {
             return;
         }
-        if let Some(whole) = self.whole.filter(|whole| whole.share >= SHARE_OF_ONE) {
-            self.enter(whole);
-            self.line += 1;
-        } else {
-            self.k = 2;
-            self.stage = Stage::Split;
+        self.stage = Stage::Local;
+        let Some(whole) = self.whole_map(view, line.line_hz, view.map_grid, scratch) else {
+            return;
+        };
+        if whole.is_some_and(|whole| whole.share >= SHARE_OF_ONE) {
+            return;
         }
+        self.k = 2;
+        self.best.clear();
+        self.best_index = f32::MAX;
+        self.stage = Stage::Split;
+    }
+
+    /// Fills a map and enters the rotation that explains all of it, when there is one.
+    /// `None` when the map is all but empty.
+    fn whole_map(
+        &mut self,
+        view: &View<'_>,
+        line_hz: f32,
+        grid: CellGrid,
+        scratch: &mut Scratch,
+    ) -> Option<Option<Found>> {
+        self.grid = grid;
+        scratch.coherence.fill(&view.window, grid, line_hz);
+        let size = grid.len().min(COHERENCE_CELLS);
+        scratch.coherence.heat(grid, &mut scratch.map[..size]);
+        weigh(&scratch.map[..size], MAP_FLOOR, &mut scratch.map_weights[..size]);
+        let cells = Cells { grid, weights: &scratch.map_weights[..size], floor: 0 };
+        let mut one = KMeans::seed(cells, 1, Seeding::FarthestMean);
+        one.sweep(cells);
+        let all = without_outliers(cells, one.clusters(), 0)?;
+        let (region, total) = collect(scratch.coherence.phasors(grid), |p| inside(p, &all));
+        if region.len() < LEAST_PHASORS {
+            return None;
+        }
+        let winding = explain(&region, all);
+        if winding.windings == 0 && winding.share > SHARE_OF_ONE {
+            self.in_step_hz = self.in_step_hz.or(Some(line_hz));
+        }
+        let whole = believe(&winding, (&region, total), &all, line_hz, grid);
+        if let Some(whole) = whole {
+            self.enter(whole);
+        }
+        Some(whole)
     }
 
     /// Splits the map into k clusters; after the last k, takes those of the best index that turn.
-    fn split(&mut self, view: &View<'_>, scratch: &Scratch) {
-        let grid = view.map_grid;
+    fn split(&mut self, scratch: &Scratch) {
+        let grid = self.grid;
         let weights = &scratch.map_weights[..grid.len().min(COHERENCE_CELLS)];
+        let cells = Cells { grid, weights, floor: 0 };
         for seeding in [Seeding::FarthestMean, Seeding::FarthestNearest] {
-            let mut kmeans = KMeans::seed(grid, weights, self.k, seeding);
-            while !kmeans.sweep(grid, weights) {}
-            let index = davies_bouldin(grid, weights, kmeans.clusters());
+            let mut kmeans = KMeans::seed(cells, self.k, seeding);
+            while !kmeans.sweep(cells) {}
+            let index = davies_bouldin(cells, kmeans.clusters());
             if let Some(index) = index.filter(|index| *index < self.best_index) {
                 self.best_index = index;
                 self.best.clear();
@@ -287,28 +381,35 @@ impl Extraction {
             return;
         }
         let line_hz = self.lines.get(self.line).map_or(0.0, |line| line.line_hz);
-        let mut turning = Vec::<Found, MAX_CLUSTERS>::new();
         for index in 0..self.best.len() {
-            let Some(part) = candidate(grid, weights, &self.best, index) else { continue };
-            let phasors = scratch.coherence.phasors(grid);
+            let Some(part) = without_outliers(cells, &self.best, index) else { continue };
             let best = &self.best;
-            let (region, total) =
-                collect(phasors, |p| inside(p, &part) && nearest(best, p.x_px, p.y_px).0 == index);
-            let winding = explain(&region, part.disc);
-            if let Some(one) = believe(&winding, (&region, total), &part, line_hz) {
-                turning.push(one).ok();
+            let (region, total) = collect(scratch.coherence.phasors(grid), |p| {
+                inside(p, &part) && nearest(best, p.x_px, p.y_px).0 == index
+            });
+            let winding = explain(&region, part);
+            if let Some(one) = believe(&winding, (&region, total), &part, line_hz, grid) {
+                self.enter(one);
             }
         }
-        if turning.is_empty()
-            && let Some(whole) = self.whole
-        {
-            turning.push(whole).ok();
-        }
-        for one in turning {
-            self.enter(one);
-        }
-        self.line += 1;
+        self.stage = Stage::Local;
+    }
+
+    /// Looks at the line's tile alone in finer cells, unless a rotor is known there: a small rotor of many blades
+    /// turns its phase over less than a cell of the whole image.
+    fn local(&mut self, view: &View<'_>, scratch: &mut Scratch) {
         self.stage = Stage::Map;
+        let line = self.lines.get(self.line).copied().unwrap_or_default();
+        self.line += 1;
+        let Disc { x_px, y_px, radius_px } = line.tile;
+        if self.candidates.iter().any(|found| found.disc.overlaps(&line.tile)) {
+            return;
+        }
+        let half_px = (LOCAL_SHARE * radius_px).max(LEAST_LOCAL_PX);
+        let grid = CellGrid::around(x_px, y_px, half_px, COHERENCE_CELLS);
+        if grid.cell_log2 < view.map_grid.cell_log2 {
+            self.whole_map(view, line.line_hz, grid, scratch);
+        }
     }
 
     /// Enters a candidate; when the list is full, in place of the one that explains least.
@@ -323,9 +424,9 @@ impl Extraction {
     }
 }
 
-fn inside(phasor: &Phasor, part: &Candidate) -> bool {
-    let (dx, dy) = (phasor.x_px - part.disc.x_px, phasor.y_px - part.disc.y_px);
-    let reach = 1.2 * part.disc.radius_px;
+fn inside(phasor: &Phasor, part: &Disc) -> bool {
+    let (dx, dy) = (phasor.x_px - part.x_px, phasor.y_px - part.y_px);
+    let reach = 1.2 * part.radius_px;
     dx * dx + dy * dy < reach * reach
 }
 
@@ -333,21 +434,28 @@ fn inside(phasor: &Phasor, part: &Candidate) -> bool {
 fn believe(
     winding: &Winding,
     (region, total): (&[Phasor], usize),
-    part: &Candidate,
+    part: &Disc,
     line_hz: f32,
+    grid: CellGrid,
 ) -> Option<Found> {
     let thinned = total as f32 / region.len().max(1) as f32;
     let axis = Disc { x_px: winding.x_px, y_px: winding.y_px, radius_px: 0.0 };
-    let off_centre = MOST_OFF_CENTRE * part.disc.radius_px;
+    let off_centre = MOST_OFF_CENTRE * part.radius_px;
     let believed = winding.windings != 0
         && region.len() >= LEAST_PHASORS
         && winding.share >= LEAST_SHARE
         && winding.share - winding.share_in_step >= LEAST_LEAD
-        && part.disc.distance2(&axis) <= off_centre * off_centre;
-    believed.then(|| Found {
-        disc: Disc { radius_px: rim(region, &axis), ..axis },
+        && part.distance2(&axis) <= off_centre * off_centre;
+    let radius_px = rim(region, &axis);
+    let cell_px = grid.cell_px();
+    // Both polarities of a cell are phasors of their own.
+    let covered_px2 = 0.5 * total as f32 * cell_px * cell_px;
+    let disc_px2 = core::f32::consts::PI * radius_px * radius_px;
+    (believed && covered_px2 > LEAST_COVER * disc_px2).then(|| Found {
+        disc: Disc { radius_px, ..axis },
         omega_rad_s: line_hz * TAU / winding.windings as f32,
         windings: winding.windings.unsigned_abs(),
+        line_hz,
         share: winding.share,
         explained: winding.share * region.iter().map(|p| p.amplitude).sum::<f32>() * thinned,
     })

@@ -13,14 +13,18 @@ pub struct HeatMap<'m> {
 }
 
 /// How pixels map to cells.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CellGrid {
     /// Cells in a row.
     pub columns: usize,
     /// Rows of cells.
     pub rows: usize,
-    /// Side of a cell in pixels, as a power of two: 2 unless the sensor has more cells than the memory.
+    /// Side of a cell in pixels, as a power of two.
     pub cell_log2: u8,
+    /// Left edge of the grid in pixels.
+    pub x0: u16,
+    /// Top edge of the grid in pixels.
+    pub y0: u16,
 }
 
 impl CellGrid {
@@ -33,10 +37,19 @@ impl CellGrid {
             let columns = (geometry.width_px as usize).div_ceil(side);
             let rows = (geometry.height_px as usize).div_ceil(side);
             if columns * rows <= capacity || cell_log2 >= 11 {
-                return Self { columns, rows, cell_log2 };
+                return Self { columns, rows, cell_log2, x0: 0, y0: 0 };
             }
             cell_log2 += 1;
         }
+    }
+
+    /// The finest grid, from cells of 2x2 pixels up, that shows the square of `half_px` about a point with `capacity` cells.
+    #[must_use]
+    pub fn around(x_px: f32, y_px: f32, half_px: f32, capacity: usize) -> Self {
+        let (x0, y0) = ((x_px - half_px).max(0.0) as u16, (y_px - half_px).max(0.0) as u16);
+        let side = ((2.0 * half_px) as u16).clamp(1, Geometry::MAX_PX);
+        let square = Geometry { width_px: side, height_px: side };
+        Self { x0, y0, ..Self::fit(square, 1, capacity) }
     }
 
     /// Number of cells.
@@ -57,10 +70,17 @@ impl CellGrid {
         (1_u16 << self.cell_log2) as f32
     }
 
-    /// The cell of a pixel.
+    /// The cell of a pixel; [`usize::MAX`] outside the grid.
     #[must_use]
     pub const fn index(self, x: u16, y: u16) -> usize {
-        (y >> self.cell_log2) as usize * self.columns + (x >> self.cell_log2) as usize
+        // Left of the edge or above it wraps to a large number.
+        let column = (x.wrapping_sub(self.x0) >> self.cell_log2) as usize;
+        let row = (y.wrapping_sub(self.y0) >> self.cell_log2) as usize;
+        if column < self.columns && row < self.rows {
+            row * self.columns + column
+        } else {
+            usize::MAX
+        }
     }
 
     /// Centre of a cell in pixels.
@@ -69,7 +89,33 @@ impl CellGrid {
         let half = 0.5 * (self.cell_px() - 1.0);
         let column = (index % self.columns) as f32;
         let row = (index / self.columns) as f32;
-        (column * self.cell_px() + half, row * self.cell_px() + half)
+        (
+            f32::from(self.x0) + column * self.cell_px() + half,
+            f32::from(self.y0) + row * self.cell_px() + half,
+        )
+    }
+}
+
+/// Cells with a weight above a floor: what is clustered.
+#[derive(Clone, Copy, Debug)]
+pub struct Cells<'a> {
+    /// Where the cells lie.
+    pub grid: CellGrid,
+    /// Their weights, row by row; 0 = not in use.
+    pub weights: &'a [u8],
+    /// Weights below this are not in use either.
+    pub floor: u8,
+}
+
+impl<'a> Cells<'a> {
+    /// Cells in use as (x px, y px, weight).
+    pub fn iter(self) -> impl Iterator<Item = (f32, f32, f32)> + use<'a> {
+        let Self { grid, weights, floor } = self;
+        let used = weights.iter().enumerate().filter(move |(_, w)| **w >= floor.max(1));
+        used.map(move |(index, weight)| {
+            let (x, y) = grid.centre(index);
+            (x, y, f32::from(*weight))
+        })
     }
 }
 

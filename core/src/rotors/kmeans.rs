@@ -5,7 +5,7 @@
 
 use heapless::Vec;
 
-use super::heat::CellGrid;
+use super::heat::Cells;
 use crate::limits::MAX_CLUSTERS;
 use crate::math::rough;
 
@@ -64,30 +64,26 @@ pub fn nearest(clusters: &[Cluster], x_px: f32, y_px: f32) -> (usize, f32) {
     best
 }
 
-/// Cells with a weight, as (x px, y px, weight).
-pub fn weighted_cells(grid: CellGrid, weights: &[u8]) -> impl Iterator<Item = (f32, f32, f32)> {
-    weights.iter().enumerate().filter(|(_, weight)| **weight > 0).map(move |(index, weight)| {
-        let (x, y) = grid.centre(index);
-        (x, y, f32::from(*weight))
-    })
-}
-
 impl KMeans {
     /// Chooses `k` seeds (1 to [`MAX_CLUSTERS`]): the highest cell, then the farthest with more than 0.3 of it.
     #[must_use]
-    pub fn seed(grid: CellGrid, weights: &[u8], k: usize, seeding: Seeding) -> Self {
+    pub fn seed(cells: Cells<'_>, k: usize, seeding: Seeding) -> Self {
         let mut clusters = Vec::<Cluster, MAX_CLUSTERS>::new();
-        let Some((top, highest)) =
-            weights.iter().enumerate().max_by_key(|(index, w)| (**w, usize::MAX - index))
-        else {
+        let mut highest = (0.0, 0.0, 0.0);
+        for cell in cells.iter() {
+            if cell.2 > highest.2 {
+                highest = cell;
+            }
+        }
+        let (x_px, y_px, top) = highest;
+        if top <= 0.0 {
             return Self::default();
-        };
-        let floor = SEED_SHARE * f32::from(*highest);
-        let (x_px, y_px) = grid.centre(top);
+        }
+        let floor = SEED_SHARE * top;
         clusters.push(Cluster { x_px, y_px, mass: 0.0 }).ok();
         while clusters.len() < k.min(MAX_CLUSTERS) {
             let mut best = (0.0_f32, 0.0, 0.0);
-            for (x, y, weight) in weighted_cells(grid, weights) {
+            for (x, y, weight) in cells.iter() {
                 if weight <= floor {
                     continue;
                 }
@@ -111,9 +107,9 @@ impl KMeans {
 
     /// One assignment and update of all centroids; `true` once they have settled.
     /// Cost: about 10 instructions a weighted cell and cluster.
-    pub fn sweep(&mut self, grid: CellGrid, weights: &[u8]) -> bool {
+    pub fn sweep(&mut self, cells: Cells<'_>) -> bool {
         let mut sums = [(0.0_f32, 0.0_f32, 0.0_f32); MAX_CLUSTERS];
-        for (x, y, weight) in weighted_cells(grid, weights) {
+        for (x, y, weight) in cells.iter() {
             let sum = &mut sums[nearest(&self.clusters, x, y).0];
             sum.0 += x * weight;
             sum.1 += y * weight;
@@ -144,12 +140,12 @@ impl KMeans {
 /// `None` for fewer than two clusters, where the index does not exist. Distances by [`rough::sqrt`]: the
 /// index decides between clusterings that differ by tens of percent.
 #[must_use]
-pub fn davies_bouldin(grid: CellGrid, weights: &[u8], clusters: &[Cluster]) -> Option<f32> {
+pub fn davies_bouldin(cells: Cells<'_>, clusters: &[Cluster]) -> Option<f32> {
     if clusters.len() < 2 {
         return None;
     }
     let mut spread = [(0.0_f32, 0.0_f32); MAX_CLUSTERS];
-    for (x, y, weight) in weighted_cells(grid, weights) {
+    for (x, y, weight) in cells.iter() {
         let (index, distance2) = nearest(clusters, x, y);
         spread[index].0 += weight * rough::sqrt(distance2);
         spread[index].1 += weight;
@@ -173,7 +169,13 @@ pub fn davies_bouldin(grid: CellGrid, weights: &[u8], clusters: &[Cluster]) -> O
 mod tests {
     use super::*;
 
-    const GRID: CellGrid = CellGrid { columns: 80, rows: 60, cell_log2: 2 };
+    use super::super::heat::CellGrid;
+
+    const GRID: CellGrid = CellGrid { columns: 80, rows: 60, cell_log2: 2, x0: 0, y0: 0 };
+
+    fn cells(weights: &[u8]) -> Cells<'_> {
+        Cells { grid: GRID, weights, floor: 0 }
+    }
 
     fn discs(list: &[(f32, f32, f32)]) -> [u8; 4800] {
         let mut weights = [0; 4800];
@@ -190,8 +192,8 @@ mod tests {
     }
 
     fn cluster(weights: &[u8], k: usize, seeding: Seeding) -> KMeans {
-        let mut kmeans = KMeans::seed(GRID, weights, k, seeding);
-        while !kmeans.sweep(GRID, weights) {}
+        let mut kmeans = KMeans::seed(cells(weights), k, seeding);
+        while !kmeans.sweep(cells(weights)) {}
         kmeans
     }
 
@@ -208,7 +210,7 @@ mod tests {
         let best = (2..=6)
             .map(|k| {
                 let kmeans = cluster(&weights, k, Seeding::FarthestNearest);
-                (k, davies_bouldin(GRID, &weights, kmeans.clusters()).unwrap_or(f32::MAX))
+                (k, davies_bouldin(cells(&weights), kmeans.clusters()).unwrap_or(f32::MAX))
             })
             .min_by(|a, b| a.1.total_cmp(&b.1));
         assert_eq!(best.map(|b| b.0), Some(3));
@@ -218,12 +220,12 @@ mod tests {
     fn the_index_does_not_exist_for_one_cluster() {
         let weights = discs(&[(100.0, 100.0, 40.0)]);
         let kmeans = cluster(&weights, 1, Seeding::FarthestMean);
-        assert_eq!(davies_bouldin(GRID, &weights, kmeans.clusters()), None);
+        assert_eq!(davies_bouldin(cells(&weights), kmeans.clusters()), None);
     }
 
     #[test]
     fn an_empty_map_has_no_clusters() {
         let weights = [0; 4800];
-        assert!(KMeans::seed(GRID, &weights, 3, Seeding::FarthestMean).clusters().len() <= 1);
+        assert!(KMeans::seed(cells(&weights), 3, Seeding::FarthestMean).clusters().len() <= 1);
     }
 }

@@ -2,9 +2,8 @@
 
 use super::baseline::{Estimate, Pace, Pairs};
 use super::initial::{Rates, ladder, median};
-use super::phase::{Pattern, newton, slope};
+use super::phase::{Pattern, harmonics, newton, slope};
 use super::polar::{PolarTrack, track};
-use super::scan::{Scan, Scanner};
 use super::statistics::mean_and_error;
 use super::symmetry::symmetry;
 use crate::math::{TAU, sqrt};
@@ -21,16 +20,22 @@ const FOLLOWING_STEPS: u8 = 2;
 const FOLLOWING_SIGMA: f32 = 1e-3;
 /// A rotor keeps at least this share of its events in step.
 const LEAST_COHERENCE: f32 = 0.3;
-/// Power of the scan over chance, per window.
-const LEAST_SCORE: f32 = 40.0;
-/// Power at the opposite frequency over power at the line: a standing pattern beyond this.
-const MOST_STANDING: f32 = 0.7;
-/// Two coarse speeds that differ by more than this contradict each other.
+/// Share in step of the second best harmonic over that of the best: beyond this the pattern stands, or the centre is off.
+const MOST_STANDING: f32 = 0.8;
+/// Two coarse speeds that differ by more than this contradict each other: the speeds that a line could also mean are
+/// a sixteenth apart at worst, but half for a single mark, whose registration has less to go by.
 const COARSE_AGREEMENT: f32 = 0.15;
+const COARSE_AGREEMENT_OF_ONE: f32 = 0.25;
+/// Multiples of the blade count that are looked at for the phase, the highest harmonic, the least share in step,
+/// and the steps of the centre.
+const MOST_MULTIPLE: u32 = 4;
+const MOST_HARMONIC: u32 = 16;
+const SHARP_COHERENCE: f32 = 0.4;
+const SHARPEN_STEPS: u8 = 3;
 /// The rate about a free axis contradicts when it is off by this share and this many of its standard errors.
 const FREE_AXIS_AGREEMENT: f32 = 0.25;
 const FREE_AXIS_SIGMAS: f32 = 4.0;
-/// Scan and phase look at the same lines: they must agree closely.
+/// Two harmonics of one line differ by a fifteenth or more.
 const SCAN_AGREEMENT: f32 = 0.04;
 /// Fewest events of a rotor that are measured.
 const LEAST_EVENTS: usize = 300;
@@ -60,6 +65,11 @@ const LOCK_AGREEMENT: f32 = 2e-3;
 const LOCK_SIGMAS: f32 = 8.0;
 /// A lock with a larger relative error is only coarse.
 const MOST_LOCK_SIGMA: f32 = 3e-3;
+/// A coarse reading's phase must give its speed and be straight within these shares, and the initial alignment of
+/// every segment must give it within the last.
+const COARSE_PHASE: f32 = 0.05;
+const COARSE_PHASE_SIGMA: f32 = 0.03;
+const COARSE_SPREAD: f32 = 0.5;
 /// Error of a coarse reading, relative, for one symmetry period in the window.
 const COARSE_SIGMA: f32 = 0.01;
 /// Fastest shaft, and fastest passing of blades, in revolutions a minute.
@@ -86,6 +96,7 @@ enum Stage {
     Newton,
     Scan,
     Symmetry,
+    Sharpen,
     Initial,
     Refinement,
     Further,
@@ -108,6 +119,7 @@ pub struct Measurement {
     disc: Disc,
     omega_rad_s: f32,
     harmonic: u32,
+    line_hz: f32,
     events: usize,
     parts: Option<u8>,
     alike: bool,
@@ -135,6 +147,7 @@ impl Measurement {
             disc: found.disc,
             omega_rad_s: found.omega_rad_s,
             harmonic: found.windings,
+            line_hz: found.line_hz,
             events: 0,
             parts: None,
             alike: true,
@@ -156,7 +169,7 @@ impl Measurement {
     pub fn follow(found: &Found, parts: Option<u8>, alike: bool) -> Self {
         let mut following = Self::new(found);
         following.follows = true;
-        following.turn = NEWTON_STEPS - FOLLOWING_STEPS;
+        following.turn = following.first_turn();
         following.parts = parts;
         following.alike = alike;
         following
@@ -168,13 +181,13 @@ impl Measurement {
         window: &Window<'_>,
         stated: &Stated,
         polar: &mut PolarTrack,
-        scanner: &mut Scanner,
         icp: &mut Icp,
     ) -> bool {
         match self.stage {
-            Stage::Newton => self.newton(window, polar, scanner),
-            Stage::Scan => self.scan(window, polar, scanner),
+            Stage::Newton => self.newton(window, polar),
+            Stage::Scan => self.scan(polar),
             Stage::Symmetry => self.symmetry(stated, polar),
+            Stage::Sharpen => self.sharpen(window, polar),
             Stage::Initial => self.initial(window, icp),
             Stage::Refinement => self.refinement(window, icp),
             Stage::Further => self.further(window, icp),
@@ -193,6 +206,7 @@ impl Measurement {
             Stage::Newton => "centre",
             Stage::Scan => "scan",
             Stage::Symmetry => "symmetry",
+            Stage::Sharpen => "sharpen",
             Stage::Initial => "initial",
             Stage::Refinement => "refinement",
             Stage::Further => "further refinement",
@@ -209,21 +223,19 @@ impl Measurement {
     }
 
     /// Centre and speed by the polar phase, a Newton step at a time.
-    fn newton(&mut self, window: &Window<'_>, polar: &mut PolarTrack, scanner: &mut Scanner) {
-        self.events = track(window, self.disc, polar);
+    fn newton(&mut self, window: &Window<'_>, polar: &mut PolarTrack) {
+        if self.turn == self.first_turn() {
+            self.events = track(window, self.disc, polar);
+        }
         self.evidence.events = self.events as u32;
         if self.events < LEAST_EVENTS {
             return self.refuse(Reason::TooFewEvents);
         }
         if self.turn < NEWTON_STEPS {
             self.turn += 1;
-            let found =
-                newton(polar, self.disc, self.omega_rad_s, self.harmonic, window.duration_us);
-            let Some(step) = found else { return self.refuse(Reason::NoRotation) };
-            let reach_px = 0.3 * self.disc.radius_px;
-            self.disc.x_px += step.dx_px.clamp(-reach_px, reach_px);
-            self.disc.y_px += step.dy_px.clamp(-reach_px, reach_px);
-            self.omega_rad_s += step.domega_rad_s;
+            if !self.step_centre(window, polar) {
+                self.refuse(Reason::NoRotation);
+            }
             return;
         }
         let coherence =
@@ -238,8 +250,12 @@ impl Measurement {
             self.stage = Stage::Lock;
             return;
         }
-        scanner.restart();
         self.stage = Stage::Scan;
+    }
+
+    /// Turn at which the centre starts to be refined.
+    const fn first_turn(&self) -> u8 {
+        if self.follows { NEWTON_STEPS - FOLLOWING_STEPS } else { 0 }
     }
 
     /// Symmetry periods in the window, and the window that a lock needs.
@@ -252,34 +268,31 @@ impl Measurement {
         periods
     }
 
-    /// Scan over harmonic and frequency about the refined centre: first coarse witness.
-    fn scan(&mut self, window: &Window<'_>, polar: &PolarTrack, scanner: &mut Scanner) {
-        if !scanner.step(polar, window.duration_us) {
-            return;
-        }
-        let Some(scan) = scanner.finish(polar, window.duration_us) else {
-            return self.refuse(Reason::NoRotation);
-        };
-        let Scan { omega_rad_s, score, standing, .. } = scan;
-        self.evidence.scan_rad_s = Some(omega_rad_s);
-        self.evidence.scan_score = Some(score);
+    /// Which harmonic of the line turns about the refined centre: first coarse witness.
+    fn scan(&mut self, polar: &PolarTrack) {
+        let line_hz = self.omega_rad_s.abs() * self.harmonic as f32 / TAU;
+        let scan = harmonics(polar, self.disc, line_hz);
+        let standing = scan.second_share / scan.share.max(1e-3);
+        self.evidence.scan_rad_s = (scan.best != 0).then(|| self.line_hz * TAU / scan.best as f32);
+        self.evidence.scan_score = Some(scan.share * scan.share * polar.len() as f32);
         self.evidence.scan_standing = Some(standing);
-        if score < LEAST_SCORE || standing > MOST_STANDING {
+        if scan.best == 0 {
             return self.refuse(Reason::NoRotation);
         }
-        let revolutions = omega_rad_s.abs() * window.duration_us as f32 * 1e-6 / TAU;
-        // The scan's lines are a tenth of a line wide at best.
-        let tolerance = SCAN_AGREEMENT.max(0.3 / (revolutions * scan.harmonic as f32));
-        if (omega_rad_s - self.omega_rad_s).abs() > tolerance * omega_rad_s.abs() {
+        let omega_rad_s = line_hz * TAU / scan.best as f32;
+        if (omega_rad_s - self.omega_rad_s).abs() > SCAN_AGREEMENT * omega_rad_s.abs() {
             if self.second_look {
                 return self.refuse(Reason::Ambiguous);
             }
             self.second_look = true;
             self.omega_rad_s = omega_rad_s;
-            self.harmonic = scan.harmonic;
+            self.harmonic = scan.best.unsigned_abs();
             self.turn = 0;
             self.stage = Stage::Newton;
             return;
+        }
+        if standing > MOST_STANDING {
+            return self.refuse(Reason::Ambiguous);
         }
         self.turn = 0;
         self.stage = Stage::Symmetry;
@@ -297,7 +310,42 @@ impl Measurement {
             return self.refuse(Reason::TooFast);
         }
         self.turn = 0;
-        self.stage = Stage::Initial;
+        self.stage = Stage::Sharpen;
+    }
+
+    /// Goes over to the multiple of the blade count that tells most about the phase, and refines the centre with it.
+    fn sharpen(&mut self, window: &Window<'_>, polar: &mut PolarTrack) {
+        let parts = u32::from(self.parts.unwrap_or(1)).max(1);
+        if self.turn == 0 {
+            let mut best = (0.0_f32, self.harmonic);
+            for harmonic in (1..=MOST_MULTIPLE).map(|k| k * parts).filter(|h| *h <= MOST_HARMONIC) {
+                let coherence =
+                    Pattern::learn(polar, self.disc, self.omega_rad_s, harmonic).coherence();
+                let lever = coherence * harmonic as f32;
+                if coherence > SHARP_COHERENCE && lever > best.0 {
+                    best = (lever, harmonic);
+                }
+            }
+            self.harmonic = best.1;
+        }
+        self.step_centre(window, polar);
+        self.turn += 1;
+        if self.turn >= SHARPEN_STEPS {
+            self.turn = 0;
+            self.stage = Stage::Initial;
+        }
+    }
+
+    /// One Newton step of centre and speed; `false` when the phase gives none.
+    fn step_centre(&mut self, window: &Window<'_>, polar: &mut PolarTrack) -> bool {
+        let found = newton(polar, self.disc, self.omega_rad_s, self.harmonic, window.duration_us);
+        let Some(step) = found else { return false };
+        let reach_px = 0.3 * self.disc.radius_px;
+        self.disc.x_px += step.dx_px.clamp(-reach_px, reach_px);
+        self.disc.y_px += step.dy_px.clamp(-reach_px, reach_px);
+        self.omega_rad_s += step.domega_rad_s;
+        self.events = track(window, self.disc, polar);
+        true
     }
 
     /// Initial alignment in every other segment: second coarse witness.
@@ -319,7 +367,9 @@ impl Measurement {
             return self.refuse(Reason::TooFewEvents);
         };
         self.evidence.initial_rad_s = Some(initial);
-        if (initial - self.omega_rad_s).abs() > COARSE_AGREEMENT * self.omega_rad_s.abs() {
+        let agreement =
+            if self.parts == Some(1) { COARSE_AGREEMENT_OF_ONE } else { COARSE_AGREEMENT };
+        if (initial - self.omega_rad_s).abs() > agreement * self.omega_rad_s.abs() {
             return self.refuse(Reason::Ambiguous);
         }
         if let (Some(free), Some((_, error))) =
@@ -470,12 +520,15 @@ impl Measurement {
             let both = combine(lock, phase);
             let sharp = both.sigma_rad_s < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
             let long = self.wanted_us <= 1.02 * window.duration_us as f32;
-            if agree && whole && sharp && long {
+            if !agree || !whole {
+                self.status = Status::Refused(Reason::Ambiguous);
+            } else if sharp && long {
                 self.estimate = both;
                 self.status = Status::Locked;
-            } else if !agree && !whole {
-                self.status = Status::Refused(Reason::Ambiguous);
             }
+        }
+        if lock.is_none() && !self.coarse_stands(phase) {
+            self.status = Status::Refused(Reason::Ambiguous);
         }
         let clock = stated.clock_sigma_ppm * 1e-6 * self.estimate.omega_rad_s;
         let roll = if self.drift_px_s > STILL_PX_S {
@@ -485,6 +538,18 @@ impl Measurement {
         };
         let own = self.estimate.sigma_rad_s;
         self.estimate.sigma_rad_s = sqrt(own * own + clock * clock + roll * roll);
+    }
+
+    /// Whether a reading without a lock may stand: it has no long baseline to contradict it, so the phase must advance
+    /// evenly through the window, and all segments must turn alike.
+    fn coarse_stands(&self, phase: Option<Estimate>) -> bool {
+        let omega = self.estimate.omega_rad_s;
+        let even = phase.is_some_and(|phase| {
+            (phase.omega_rad_s - omega).abs() < COARSE_PHASE * omega.abs()
+                && phase.sigma_rad_s < COARSE_PHASE_SIGMA * omega.abs()
+        });
+        let alike = |rate: &f32| (rate - omega).abs() < COARSE_SPREAD * omega.abs();
+        even && self.rates.iter().all(alike)
     }
 
     /// The result, once [`Self::step`] has returned `true`.
@@ -502,6 +567,7 @@ impl Measurement {
                 disc: self.disc,
                 omega_rad_s: self.omega_rad_s,
                 windings: self.harmonic,
+                line_hz: self.line_hz,
                 ..Found::default()
             },
             parts: self.parts,

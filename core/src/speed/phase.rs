@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 use super::baseline::Estimate;
 use super::polar::PolarEvent;
 use super::statistics::{Parabola, fit_parabola, student_over_normal};
-use crate::math::{Turn, TurnRate};
+use crate::math::{TAU, Turn, TurnRate};
 use crate::rotors::Disc;
 
 /// Blocks that the window is cut into for the slope.
@@ -76,6 +76,65 @@ impl Pattern {
     fn turns(&self) -> [Turn; BANKS] {
         self.sums.map(|(re, im)| Turn::of_vector(im, re))
     }
+}
+
+/// Highest angular harmonic that [`harmonics`] tries.
+const MOST_HARMONIC: usize = 16;
+
+/// Which angular harmonic keeps step with a frequency best.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Harmonics {
+    /// The harmonic: positive = clockwise, 0 = all directions in step.
+    pub best: i32,
+    /// Share of events in step with it.
+    pub share: f32,
+    /// The same for the next best: near `share` where the pattern stands (flicker, vibration) or the centre is off.
+    pub second_share: f32,
+}
+
+/// Tries all harmonics from -16 to 16 at one frequency in Hz. Cost: about 400 instructions an event.
+#[must_use]
+pub fn harmonics(track: &[PolarEvent], disc: Disc, line_hz: f32) -> Harmonics {
+    const TERMS: usize = 2 * MOST_HARMONIC + 1;
+    let rate = TurnRate::from_rad_s(line_hz * TAU);
+    let mut sums = [[(0.0_f32, 0.0_f32); TERMS]; BANKS];
+    let mut counts = [0_u32; BANKS];
+    for event in track {
+        let bank = bank(*event, disc);
+        counts[bank] += 1;
+        let (sin_t, cos_t) = rate.after(event.t_us).sin_cos();
+        let (sin, cos) = event.angle().sin_cos();
+        let (mut c, mut s) = (1.0_f32, 0.0_f32);
+        for m in 0..=MOST_HARMONIC {
+            // exp(i (m theta - 2 pi f t)) and exp(i (-m theta - 2 pi f t))
+            let (cc, ss, sc, cs) = (c * cos_t, s * sin_t, s * cos_t, c * sin_t);
+            let plus = &mut sums[bank][MOST_HARMONIC + m];
+            plus.0 += cc + ss;
+            plus.1 += sc - cs;
+            if m > 0 {
+                let minus = &mut sums[bank][MOST_HARMONIC - m];
+                minus.0 += cc - ss;
+                minus.1 -= sc + cs;
+            }
+            (c, s) = (c * cos - s * sin, s * cos + c * sin);
+        }
+    }
+    let mut found = Harmonics::default();
+    for term in 0..TERMS {
+        let mut pattern = Pattern { counts, ..Pattern::default() };
+        for (sum, bank) in pattern.sums.iter_mut().zip(&sums) {
+            *sum = bank[term];
+        }
+        let share = pattern.coherence();
+        if share > found.share {
+            found.second_share = found.share;
+            found.share = share;
+            found.best = term as i32 - MOST_HARMONIC as i32;
+        } else {
+            found.second_share = found.second_share.max(share);
+        }
+    }
+    found
 }
 
 /// A Newton step.

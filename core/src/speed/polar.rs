@@ -89,16 +89,8 @@ pub fn track(window: &Window<'_>, disc: Disc, track: &mut PolarTrack) -> usize {
     track.clear();
     let annulus = Annulus::of(disc);
     let mid_us = (window.duration_us / 2) as i32;
-    let total = window.events().filter(|event| annulus.place(*event).is_some()).count();
-    // Fixed-point stride, so that any ratio thins evenly.
-    let stride = ((total as u64) << 16).div_ceil(POLAR_EVENTS as u64).max(1 << 16);
-    let mut next = 0_u64;
-    let placed = window.events().filter_map(|event| Some((event, annulus.place(event)?)));
-    for (index, (event, place)) in placed.enumerate() {
-        if (index as u64) << 16 >= next {
-            next += stride;
-            track.push(PolarEvent::new(event, place, window.start_us, mid_us)).ok();
-        }
+    for (event, place) in window.even(POLAR_EVENTS, |event| annulus.place(event)) {
+        track.push(PolarEvent::new(event, place, window.start_us, mid_us)).ok();
     }
-    total
+    window.events().filter(|event| annulus.place(*event).is_some()).count()
 }

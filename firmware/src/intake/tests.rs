@@ -6,7 +6,7 @@ use embassy_futures::block_on;
 use embassy_futures::join::join;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::zerocopy_channel::{Channel, Receiver};
-use evtach_core::{Geometry, Polarity};
+use evtach_core::{Event, Geometry, Polarity};
 
 use super::*;
 use crate::record;
@@ -59,10 +59,11 @@ fn play<T>(
 
 /// Everything up to the last block: events, and how many were lost before each block.
 async fn all(mut blocks: Receiver<'_, NoopRawMutex, Block>) -> (Heap<Event>, Heap<u64>) {
+    let mut decoder = Decoder::new(500);
     let (mut events, mut lost) = (Heap::new(), Heap::new());
     loop {
         let block = blocks.receive().await;
-        events.extend(block.events.iter().copied());
+        events.extend(block.records.iter().map(|&record| decoder.decode(record)));
         lost.push(block.lost);
         let last = block.last;
         blocks.receive_done();
@@ -104,7 +105,7 @@ fn a_cut_recording_says_after_how_many_events() {
     let expected = events.len() as u32;
     // Nobody marks a last block: what was sent before the end is taken without waiting.
     let (end, received) = play(&bytes[..cut], Pace::File, async |mut blocks| {
-        let block = blocks.receive().await.events.len();
+        let block = blocks.receive().await.records.len();
         blocks.receive_done();
         block
     });

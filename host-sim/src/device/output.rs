@@ -60,6 +60,8 @@ pub struct Output {
     pub push: CallCost,
     /// What each stage cost.
     pub stages: Vec<CallCost>,
+    /// Events in windows that were given up, because measuring took too long.
+    pub overrun: u64,
     /// Memory in use.
     pub memory: MemoryUse,
 }
@@ -97,6 +99,7 @@ struct Reader {
     pending: String,
     push: Option<(u64, CallCost)>,
     stages: Vec<CallCost>,
+    overrun: Option<u64>,
     memory: Option<MemoryUse>,
 }
 
@@ -112,6 +115,7 @@ impl Reader {
             }),
             "push" => self.push = Some((number(line, "events")?, call_cost(line, "push")?)),
             "stage" => self.stages.push(call_cost(line, line.split_once(" name=")?.1)?),
+            "overrun" => self.overrun = Some(number(line, "events")?),
             "memory" => self.memory = Some(memory(line)?),
             _ => return None,
         }
@@ -134,12 +138,18 @@ impl Output {
                 .take(line)
                 .ok_or_else(|| DeviceError::Line { line: lines, text: line.to_owned() })?;
         }
-        let Reader { readings, push: Some((events, push)), stages, memory: Some(memory), .. } =
-            reader
+        let Reader {
+            readings,
+            push: Some((events, push)),
+            stages,
+            overrun: Some(overrun),
+            memory: Some(memory),
+            ..
+        } = reader
         else {
             return Err(DeviceError::Line { line: lines + 1, text: String::new() });
         };
-        Ok(Self { readings, events, push, stages, memory })
+        Ok(Self { readings, events, push, stages, overrun, memory })
     }
 }
 
@@ -153,6 +163,7 @@ rotor id=0 x_px=3f800000
 spent push=7 poll=9
 push events=3 calls=1 ticks=7 longest=7
 stage calls=2 ticks=9 longest=5 name=fine scan
+overrun events=6
 memory tachometer=1 store=2 heat=3 blocks=4 stack=5
 ";
 
@@ -169,7 +180,7 @@ memory tachometer=1 store=2 heat=3 blocks=4 stack=5
             (output.stages[0].name.as_str(), output.stages[0].longest_ticks),
             ("fine scan", 5)
         );
-        assert_eq!(output.memory.stack_bytes, 5);
+        assert_eq!((output.overrun, output.memory.stack_bytes), (6, 5));
     }
 
     #[test]
@@ -177,6 +188,6 @@ memory tachometer=1 store=2 heat=3 blocks=4 stack=5
         let foreign = TEXT.replace("ticks=9", "ticks=x");
         assert!(matches!(Output::parse(&foreign), Err(DeviceError::Line { line: 5, .. })));
         let cut = &TEXT[..TEXT.find("memory").unwrap_or(0)];
-        assert!(matches!(Output::parse(cut), Err(DeviceError::Line { line: 6, .. })));
+        assert!(matches!(Output::parse(cut), Err(DeviceError::Line { line: 7, .. })));
     }
 }

@@ -66,8 +66,10 @@ pub fn with_tachometer<R>(
     work(&mut Tachometer::new(settings, memory))
 }
 
-/// Largest piece handed to the tachometer before it is polled: far less than two segments hold.
+/// Largest piece handed to the tachometer before it is polled.
 const PIECE_EVENTS: usize = 256;
+/// Longest piece: shorter than any segment, so that windows of a quiet recording are not given up either.
+const PIECE_US: u64 = 500;
 
 /// Pushes events and gyro samples in time order and measures every window as soon as it is full.
 ///
@@ -78,7 +80,8 @@ pub fn feed(
     samples: &mut &[GyroSample],
     mut reading: impl FnMut(Reading),
 ) {
-    for piece in events.chunks(PIECE_EVENTS) {
+    let stretches = events.chunk_by(|a, b| a.t_us / PIECE_US == b.t_us / PIECE_US);
+    for piece in stretches.flat_map(|stretch| stretch.chunks(PIECE_EVENTS)) {
         let Some(first) = piece.first() else { continue };
         while let Some((sample, rest)) = samples.split_first() {
             if sample.t_us > first.t_us {

@@ -128,10 +128,12 @@ impl Light {
     /// Seconds between two looks at the light.
     #[must_use]
     pub fn step_s(&self) -> f64 {
-        self.period_s() / (16.0 * (1.0 + self.lamp.harmonics.len() as f64))
+        self.period_s() / 24.0
     }
 
-    fn depth(&self, x: f64, y: f64) -> f64 {
+    /// Depth of the modulation at a place.
+    #[must_use]
+    pub fn depth(&self, [x, y]: [f64; 2]) -> f64 {
         let share = self.lamp.spot_px.map_or(1.0, |[sx, sy, radius]| {
             let d = ((x - sx).powi(2) + (y - sy).powi(2)) / (radius * radius).max(1.0);
             // A spot fades; its nominal radius is where a quarter is left.
@@ -142,18 +144,18 @@ impl Light {
 
     /// Largest change of the logarithm of intensity at a pixel.
     #[must_use]
-    pub fn swing(&self, x: f64, y: f64) -> f64 {
-        let depth = self.depth(x, y);
+    pub fn swing(&self, place: [f64; 2]) -> f64 {
+        let depth = self.depth(place);
         ((1.0 + depth) / (1.0 - depth)).ln()
     }
 
-    /// Logarithm of the light at a place and time.
+    /// The light at a time, relative to its mean, where its depth is known.
     #[must_use]
-    pub fn level(&self, room: [f64; 2], t_s: f64) -> f64 {
+    pub fn factor(&self, depth: f64, t_s: f64) -> f64 {
         let place = (t_s * self.lamp.frequency_hz).rem_euclid(1.0) * Self::SAMPLES as f64;
         let i = (place as usize).min(Self::SAMPLES - 1);
         let wave = self.wave[i] + (self.wave[i + 1] - self.wave[i]) * (place - i as f64);
-        (1.0 + self.depth(room[0], room[1]) * wave).ln()
+        1.0 + depth * wave
     }
 }
 

@@ -121,9 +121,10 @@ impl Blades {
         ring
     }
 
-    /// What is seen at an angle relative to the first blade.
+    /// What is seen at an angle relative to the first blade. `sense` is the sign of the rotor's speed, or 0 where the
+    /// camera may outrun it: then an edge may come from either side.
     #[must_use]
-    pub fn look(&self, ring: &Ring, angle: f64) -> Look {
+    pub fn look(&self, ring: &Ring, angle: f64, sense: f64) -> Look {
         let never = Look { cover: ring.hub, free: f64::INFINITY };
         let Some(half) = ring.half else { return never };
         if ring.hub >= 1.0 {
@@ -132,17 +133,31 @@ impl Blades {
         let place = (angle - ring.bend) / self.pitch;
         let nearest = rounded(place);
         let off = (place - nearest) * self.pitch;
-        if self.odd_width == 1.0 {
-            // Blades cover at most 0.7 of the pitch: the nearest blade has the nearest edge.
-            let (cover, free) = self.blade(ring, half, 1.0, off.abs());
-            return Look { cover: ring.hub + (1.0 - ring.hub) * cover * ring.tip, free };
+        let alike = self.odd_width == 1.0;
+        let width = if alike { 1.0 } else { self.width(nearest) };
+        let (mut cover, mut free) = self.blade(ring, half * width, width, off.abs());
+        // The pixel moves against the rotor: `ahead` shrinks until the blade's middle passes.
+        let ahead = off * sense;
+        if sense != 0.0 && free > 0.0 && self.shape != Shape::Dot && off.abs() < half * width {
+            // On the blade: the next edge is the trailing one.
+            free = ahead + half * width - 0.5 * self.transition / ring.lever;
+        } else if free > 0.0 && ahead <= 0.0 {
+            // Leaving this blade, or not known: the next one counts.
+            let next = nearest - if sense == 0.0 { -off.signum() } else { sense };
+            let width = if alike { 1.0 } else { self.width(next) };
+            let (_, free_next) = self.blade(ring, half * width, width, self.pitch - off.abs());
+            free = if sense == 0.0 { free.min(free_next) } else { free_next };
         }
-        // With one narrow blade the neighbour's edge may be the nearer one.
-        let next = nearest + if off < 0.0 { -1.0 } else { 1.0 };
-        let (a, free_a) = self.blade(ring, half, self.width(nearest), off.abs());
-        let (b, free_b) = self.blade(ring, half, self.width(next), self.pitch - off.abs());
-        let blades = a.max(b) * ring.tip;
-        Look { cover: ring.hub + (1.0 - ring.hub) * blades, free: free_a.min(free_b) }
+        let margin = 0.5 * self.transition / ring.lever;
+        if self.pitch - off.abs() < half * width + margin {
+            // So near the hub that the neighbour's blur is seen as well.
+            let next = nearest + off.signum();
+            let width = if alike { 1.0 } else { self.width(next) };
+            cover =
+                (cover + self.blade(ring, half * width, width, self.pitch - off.abs()).0).min(1.0);
+        }
+        cover *= ring.tip;
+        Look { cover: ring.hub + (1.0 - ring.hub) * cover, free }
     }
 
     /// Cover by one blade whose middle is `off` radians away, and how far it may turn unseen.
@@ -154,7 +169,6 @@ impl Blades {
             let cover = step((d - distance) / self.transition);
             return (cover, ((distance - d).abs() - self.transition / 2.0) / m);
         }
-        let half = half * width;
         let scale = ring.lever / self.transition;
         let cover = step((half - off) * scale) + step((half + off) * scale) - 1.0;
         (cover, (half - off).abs() - 0.5 / scale)
@@ -180,6 +194,16 @@ impl Blades {
         };
         let middle = f64::from(i / 2) * self.pitch + ring.bend;
         Some(if i.is_multiple_of(2) { middle + half } else { middle - half })
+    }
+
+    /// Distance in pixels from a radius to where the blades are; 0 within.
+    #[must_use]
+    pub fn gap(&self, r: f64) -> f64 {
+        let (inner, outer) = match self.shape {
+            Shape::Dot => (self.mark().0 - self.mark().1, self.mark().0 + self.mark().1),
+            _ => (self.hub, self.radius),
+        };
+        (inner - r).max(r - outer).max(0.0)
     }
 
     /// Number of edges of all blades.

@@ -11,6 +11,9 @@ use super::scene::{Rotor, Scene};
 const STEP_PX: f64 = 0.6;
 /// Largest step in pixels of the image's own motion between two samples.
 const IMAGE_STEP_PX: f64 = 0.5;
+/// Length in seconds of the straight lines that stand for the camera's motion where a rotor is seen; the fastest vibration
+/// bends away from them by less than 0.005 pixels.
+const LINE_S: f64 = 0.25e-3;
 
 /// A rotor as the field sees it.
 #[derive(Debug)]
@@ -24,6 +27,8 @@ pub struct Layer {
     tilt: [f64; 2],
     stretch: f64,
     peak_rate: f64,
+    least_rate: f64,
+    sense: f64,
     bounds: [f64; 4],
     warm_up_s: f64,
 }
@@ -52,6 +57,8 @@ impl Layer {
             tilt: [cos, sin],
             stretch: 1.0 / rotor.tilt_deg.to_radians().cos(),
             peak_rate: spin.peak_rate(span.0, span.1),
+            least_rate: spin.least_rate(span.0, span.1),
+            sense: rotor.rpm.signum(),
             bounds,
             warm_up_s: rotor.period_s(),
             blades,
@@ -93,7 +100,8 @@ impl Layer {
     pub fn hides(&self, room: [f64; 2], pose: &Pose, t_s: f64) -> bool {
         let (r, angle) = self.polar(room, pose);
         let ring = self.blades.ring(r);
-        r < self.blades.reach() && self.blades.look(&ring, angle - self.spin.angle(t_s)).cover > 0.5
+        r < self.blades.reach()
+            && self.blades.look(&ring, angle - self.spin.angle(t_s), 0.0).cover > 0.5
     }
 }
 
@@ -116,16 +124,49 @@ pub struct Field<'a> {
     peak_image_speed: f64,
 }
 
-/// One pixel's view of the field.
+/// A value that changes in a straight line over a short time.
+#[derive(Clone, Copy, Debug, Default)]
+struct Line {
+    value: f64,
+    rate: f64,
+}
+
+impl Line {
+    fn new(from: f64, to: f64, over_s: f64) -> Self {
+        Self { value: from, rate: (to - from) / over_s }
+    }
+
+    fn at(self, after_s: f64) -> f64 {
+        self.value + self.rate * after_s
+    }
+}
+
+/// A rotor seen by one pixel.
+#[derive(Debug)]
+struct Seen {
+    layer: usize,
+    /// Where nothing moves: what holds at the pixel's radius.
+    ring: Option<Ring>,
+    r: Line,
+    angle: Line,
+}
+
+/// One pixel's view of the field. What only the camera's motion changes is followed in short straight lines.
 #[derive(Debug)]
 pub struct View {
     x: f64,
     y: f64,
-    layers: Vec<(usize, Option<(Ring, f64)>)>,
+    layers: Vec<Seen>,
     lit: bool,
     textured: bool,
     /// Nothing but texture is ever seen here.
     plain: bool,
+    since_s: f64,
+    span_s: f64,
+    image_step_s: f64,
+    room: [Line; 2],
+    intensity: Line,
+    depth: Line,
 }
 
 impl View {
@@ -177,10 +218,16 @@ impl<'a> Field<'a> {
         }
     }
 
+    /// Upper bound of the speed of any point of the image because of camera and mount, in pixels per second.
+    #[must_use]
+    pub fn peak_image_speed(&self) -> f64 {
+        self.peak_image_speed
+    }
+
     /// Seconds of simulation that a pixel needs before recording starts, so that its first visits are like later ones.
     #[must_use]
     pub fn warm_up_s(&self, view: &View) -> f64 {
-        let rotors = view.layers.iter().map(|&(i, _)| self.layers[i].warm_up_s);
+        let rotors = view.layers.iter().map(|seen| self.layers[seen.layer].warm_up_s);
         let mut warm_up = rotors.fold(0.0, f64::max);
         if view.textured && self.camera_moves && !view.turns() {
             warm_up = 0.1;
@@ -188,7 +235,7 @@ impl<'a> Field<'a> {
         if let Some(light) = self.light.as_ref().filter(|_| view.lit) {
             warm_up = warm_up.max(2.0 * light.period_s());
         }
-        warm_up + 1e-3
+        warm_up
     }
 
     /// Whether the rotors' centres move on the sensor.
@@ -203,72 +250,132 @@ impl<'a> Field<'a> {
         let (x, y) = (f64::from(x), f64::from(y));
         let mut layers = Vec::new();
         if self.renders_layers {
-            for (i, layer) in self.layers.iter().enumerate().filter(|(_, l)| l.reaches(x, y)) {
-                let still = (!self.rotors_move).then(|| {
-                    let pose = self.poses.at(0.0);
-                    let (r, angle) = layer.polar(self.motion.room(&pose, x, y), &pose);
-                    (layer.blades.ring(r), angle)
-                });
-                layers.push((i, still));
-            }
+            let reaching = self.layers.iter().enumerate().filter(|(_, l)| l.reaches(x, y));
+            layers.extend(reaching.map(|(layer, _)| Seen {
+                layer,
+                ring: None,
+                r: Line::default(),
+                angle: Line::default(),
+            }));
         }
-        let lit = self.light.as_ref().is_some_and(|light| light.swing(x, y) > threshold * 0.9);
+        // On a rotor even a light too faint for events of its own moves the edges' events.
+        let least = if layers.is_empty() { threshold * 0.9 } else { 0.01 };
+        let lit = self.light.as_ref().is_some_and(|light| light.swing([x, y]) > least);
         let textured = self.texture.is_some();
-        let changes =
-            !layers.is_empty() || lit || (textured && self.camera_moves) || !self.shades.is_empty();
-        let plain = layers.is_empty() && !lit && self.shades.is_empty();
-        changes.then_some(View { x, y, layers, lit, textured, plain })
+        let shaded = !self.shades.is_empty();
+        let moves = textured && self.camera_moves;
+        if layers.is_empty() && !lit && !moves && !shaded {
+            return None;
+        }
+        let plain = layers.is_empty() && !lit && !shaded;
+        let mut view = View {
+            x,
+            y,
+            layers,
+            lit,
+            textured,
+            plain,
+            since_s: f64::NEG_INFINITY,
+            span_s: 0.0,
+            image_step_s: f64::INFINITY,
+            room: [Line { value: x, rate: 0.0 }, Line { value: y, rate: 0.0 }],
+            intensity: Line { value: 1.0, rate: 0.0 },
+            depth: Line::default(),
+        };
+        if !self.rotors_move || (view.layers.is_empty() && !self.camera_moves) {
+            self.hold(&mut view);
+        }
+        Some(view)
+    }
+
+    /// Fills in what stays as it is where nothing moves.
+    fn hold(&self, view: &mut View) {
+        let pose = self.poses.at(0.0);
+        let room = self.motion.room(&pose, view.x, view.y);
+        let still = |value: f64| Line { value, rate: 0.0 };
+        view.room = room.map(still);
+        view.intensity = still(self.texture.as_ref().map_or(1.0, |t| t.intensity(room)));
+        view.depth = still(self.light.as_ref().map_or(0.0, |l| l.depth(room)));
+        for seen in &mut view.layers {
+            let layer = &self.layers[seen.layer];
+            let (r, angle) = layer.polar(room, &pose);
+            (seen.r, seen.angle) = (still(r), still(angle));
+            seen.ring = Some(layer.blades.ring(r));
+        }
+        view.since_s = 0.0;
+        view.span_s = f64::INFINITY;
+    }
+
+    /// Lays new lines from a time on.
+    fn follow(&self, view: &mut View, t_s: f64) {
+        view.image_step_s = IMAGE_STEP_PX / self.poses.speed(t_s).max(1.0);
+        view.since_s = t_s;
+        view.span_s = if view.turns() { LINE_S } else { view.image_step_s };
+        let over_s = view.span_s;
+        let (from, to) = (self.poses.at(t_s), self.poses.at(t_s + over_s));
+        let (a, b) =
+            (self.motion.room(&from, view.x, view.y), self.motion.room(&to, view.x, view.y));
+        view.room = [Line::new(a[0], b[0], over_s), Line::new(a[1], b[1], over_s)];
+        if let Some(texture) = &self.texture {
+            view.intensity = Line::new(texture.intensity(a), texture.intensity(b), over_s);
+        }
+        if let Some(light) = self.light.as_ref().filter(|_| view.lit) {
+            view.depth = Line::new(light.depth(a), light.depth(b), over_s);
+        }
+        for seen in &mut view.layers {
+            let layer = &self.layers[seen.layer];
+            let ((r0, angle0), (r1, angle1)) = (layer.polar(a, &from), layer.polar(b, &to));
+            seen.r = Line::new(r0, r1, over_s);
+            seen.angle = Line::new(angle0, angle0 + wrapped(angle1 - angle0), over_s);
+        }
     }
 
     /// The field at a pixel and a time.
     #[must_use]
-    pub fn sample(&self, view: &View, t_s: f64) -> Sample {
-        let mut step_s = f64::INFINITY;
-        let mut rotor = None;
-        let mut intensity = 1.0;
-        let mut pose = None;
-        let mut room = [view.x, view.y];
-        if self.rotors_move {
-            let p = self.poses.at(t_s);
-            room = self.motion.room(&p, view.x, view.y);
-            pose = Some(p);
-            step_s = IMAGE_STEP_PX / self.poses.speed(t_s).max(1.0);
-        }
+    pub fn sample(&self, view: &mut View, t_s: f64) -> Sample {
         if let Some(texture) = self.texture.as_ref().filter(|_| view.plain) {
+            let room = self.motion.room(&self.poses.at(t_s), view.x, view.y);
+            let step_s = IMAGE_STEP_PX / self.poses.speed(t_s).max(1.0);
             return Sample { level: texture.level(room), step_s, rotor: None };
         }
-        if let Some(texture) = &self.texture {
-            intensity = texture.intensity(room);
+        let mut after_s = t_s - view.since_s;
+        // A look back by less than a span, to place an event, is still on the same lines.
+        if after_s.abs() > view.span_s {
+            self.follow(view, t_s);
+            after_s = 0.0;
         }
+        let mut step_s = view.image_step_s;
+        let mut rotor = None;
+        let mut intensity = view.intensity.at(after_s);
         for shade in &self.shades {
+            let room = view.room.map(|line| line.at(after_s));
             let (cover, free_px) = shade.look(room, t_s);
             intensity += (shade.intensity() - intensity) * cover;
             let speed = shade.speed() + self.peak_image_speed;
             step_s = step_s.min(free_px.max(STEP_PX) / speed.max(1e-3));
         }
-        for (i, still) in &view.layers {
-            let layer = &self.layers[*i];
-            let (ring, angle) = still.unwrap_or_else(|| {
-                let pose = pose.unwrap_or_default();
-                let (r, angle) = layer.polar(room, &pose);
-                (layer.blades.ring(r), angle)
-            });
-            let look = layer.blades.look(&ring, angle - layer.spin.angle(t_s));
+        for seen in &view.layers {
+            let layer = &self.layers[seen.layer];
+            let ring = seen.ring.unwrap_or_else(|| layer.blades.ring(seen.r.at(after_s)));
+            let angle = seen.angle.at(after_s) - layer.spin.angle(t_s);
+            // Camera motion acts like a rotation of its speed over the radius.
+            let shake_rate = self.peak_image_speed * layer.stretch / ring.r;
+            let sense = if layer.least_rate > shake_rate { layer.sense } else { 0.0 };
+            let look = layer.blades.look(&ring, angle, sense);
             if look.cover > 0.0 {
                 intensity += (layer.intensity - intensity) * look.cover;
             }
-            // Camera motion acts like a rotation of its speed over the radius.
-            let rate = layer.peak_rate + self.peak_image_speed * layer.stretch / ring.r;
+            let rate = layer.peak_rate + shake_rate;
             step_s = step_s.min(look.free.max(STEP_PX / ring.r) / rate);
             if look.free <= 0.0 {
-                rotor = Some(*i);
+                rotor = Some(seen.layer);
             }
         }
-        let mut level = if intensity == 1.0 { 0.0 } else { intensity.ln() };
         if let Some(light) = self.light.as_ref().filter(|_| view.lit) {
-            level += light.level(room, t_s);
+            intensity *= light.factor(view.depth.at(after_s), t_s);
             step_s = step_s.min(light.step_s());
         }
+        let level = if intensity == 1.0 { 0.0 } else { intensity.max(1e-6).ln() };
         Sample { level, step_s: step_s.max(1e-6), rotor }
     }
 }

@@ -54,7 +54,7 @@ pub fn generate(scene: &Scene) -> Result<Synthetic, SceneError> {
     let field = Field::new(
         scene,
         &motion,
-        -longest_period_s - 2.0 * threshold::TAIL_S,
+        -longest_period_s - 4.0 * threshold::TAIL_S,
         duration_s + 2.0 * threshold::TAIL_S,
         renders_rotors,
     );
@@ -66,8 +66,8 @@ pub fn generate(scene: &Scene) -> Result<Synthetic, SceneError> {
             for x in 0..scene.width_px {
                 let mut pixel = Pixel::new(&scene.sensor, scene.seed, x, y);
                 pixel.noise(scene.sensor.noise_hz, false, &span, &mut tray);
-                if let Some(view) = field.view(x, y, scene.sensor.threshold) {
-                    threshold::run(&field, &view, &mut pixel, &span, &mut tray);
+                if let Some(mut view) = field.view(x, y, scene.sensor.threshold) {
+                    threshold::run(&field, &mut view, &mut pixel, &span, &mut tray);
                 }
                 if !renders_rotors {
                     edges::run(&field, &contrasts, (x, y), &mut pixel, &span, &mut tray);

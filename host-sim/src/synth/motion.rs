@@ -104,6 +104,13 @@ impl Spin {
         let ramp = (self.ramp * from_s).abs().max((self.ramp * to_s).abs());
         self.omega.abs() * (1.0 + ramp + self.hunting.abs())
     }
+
+    /// Lower bound of the magnitude of the speed over `from_s` to `to_s`, in rad/s; 0 where it might turn around.
+    #[must_use]
+    pub fn least_rate(&self, from_s: f64, to_s: f64) -> f64 {
+        let ramp = (self.ramp * from_s).min(self.ramp * to_s);
+        self.omega.abs() * (1.0 + ramp - self.hunting.abs()).max(0.0)
+    }
 }
 
 /// All motion of a scene, with every random phase drawn.

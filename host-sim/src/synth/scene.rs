@@ -305,7 +305,7 @@ impl Default for Sensor {
             noise_hz: 1.0,
             hot_pixels: 0,
             hot_hz: 500.0,
-            dropout: 0.05,
+            dropout: 0.0,
             blur_px: 0.7,
             readout_mev_s: None,
             readout_queue: 4096,

@@ -146,7 +146,6 @@ fn the_first_turn_is_like_the_others() {
     let mut scene = fixed(Model::Threshold, 600.0);
     scene.duration_ms = 200.0;
     scene.sensor.noise_hz = 0.0;
-    scene.sensor.dropout = 0.0;
     let made = generate(&scene).unwrap();
     let period_us = 1e6 * scene.rotors[0].period_s();
     let mut counts = [0.0f64; 6];
@@ -242,7 +241,7 @@ fn a_fast_clock_stretches_the_stamps() {
 fn every_shape_turns_in_both_models() {
     for model in MODELS {
         for shape in [Shape::Straight, Shape::Tapered, Shape::Swept, Shape::Dot, Shape::Spokes] {
-            for blades in [1, 5, 16] {
+            for blades in [1, 5] {
                 let mut scene = fixed(model, 6000.0);
                 scene.rotors[0].shape = shape;
                 scene.rotors[0].blades = blades;
@@ -290,7 +289,7 @@ fn scenes_without_a_rotor_have_events_and_are_to_be_refused() {
         ("shake", shake, 20_000),
         ("bar", Scene { movers: vec![bar], ..none.clone() }, 50_000),
         ("walker", Scene { movers: vec![walker], ..none.clone() }, 15_000),
-        ("lamp", Scene { lamp: Some(Lamp::default()), ..none }, 500_000),
+        ("lamp", Scene { lamp: Some(Lamp::default()), duration_ms: 30.0, ..none }, 100_000),
     ];
     for (name, scene, least) in scenes {
         let made = generate(&scene).unwrap();
@@ -320,6 +319,11 @@ fn the_sensor_does_what_its_settings_say() {
     let mut on = fixed(Model::Threshold, 3000.0);
     on.sensor.all_on = true;
     assert!(generate(&on).unwrap().events.iter().all(|e| e.polarity == Polarity::On));
+    let mut lossy = fixed(Model::Edge, 3000.0);
+    let all = generate(&lossy).unwrap().truth.rotors[0].events as f64;
+    lossy.sensor.dropout = 0.2;
+    let some = generate(&lossy).unwrap().truth.rotors[0].events as f64;
+    assert!((some / all - 0.8).abs() < 0.01, "{}", some / all);
 }
 
 #[test]

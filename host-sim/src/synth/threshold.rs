@@ -9,7 +9,7 @@ use evtach_core::Polarity;
 use super::field::{Field, View};
 use super::pixel::{Pixel, Span, Tray};
 
-/// Seconds of simulation beyond the end, for events that jitter brings back.
+/// Seconds of simulation beyond either end, for events that jitter brings into the recording.
 pub const TAIL_S: f64 = 1e-3;
 
 /// Passes over the warm-up: those that every pixel makes, and how many more are drawn for each.
@@ -18,8 +18,8 @@ const PASSES: (u32, u32) = (4, 8);
 const MOVING_PASSES: (u32, u32) = (1, 4);
 
 /// Simulates one pixel.
-pub fn run(field: &Field, view: &View, pixel: &mut Pixel, span: &Span, tray: &mut Tray) {
-    let start_s = -field.warm_up_s(view);
+pub fn run(field: &Field, view: &mut View, pixel: &mut Pixel, span: &Span, tray: &mut Tray) {
+    let start_s = -TAIL_S - field.warm_up_s(view);
     // What matters is how far the level is from the reference. With unequal thresholds that wanders from period to period
     // without ever settling; drawing the number of passes puts each pixel at another point of its round.
     let (least, more) = if field.moves() { MOVING_PASSES } else { PASSES };
@@ -27,7 +27,7 @@ pub fn run(field: &Field, view: &View, pixel: &mut Pixel, span: &Span, tray: &mu
     let mut state = State { t_s: start_s, above: 0.0 };
     for _ in 0..passes {
         let from = State { t_s: start_s, above: state.above };
-        state = advance(field, view, pixel, from, 0.0, |_, _, _, _| {});
+        state = advance(field, view, pixel, from, -TAIL_S, |_, _, _, _| {});
     }
     advance(field, view, pixel, state, span.duration_s + TAIL_S, |pixel, t_s, polarity, rotor| {
         pixel.fire(t_s, polarity, rotor, span, tray);
@@ -46,7 +46,7 @@ struct State {
 /// Advances one pixel to a time, or a little beyond it when it is then held in reset.
 fn advance(
     field: &Field,
-    view: &View,
+    view: &mut View,
     pixel: &mut Pixel,
     from: State,
     end_s: f64,

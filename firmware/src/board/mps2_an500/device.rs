@@ -12,7 +12,7 @@ use embassy_futures::block_on;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::zerocopy_channel::{Channel, Receiver, Sender};
 use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
-use evtach_core::{Memory, Reading, Settings, StoredEvent, Tachometer};
+use evtach_core::{Geometry, Memory, Reading, Settings, StoredEvent, Tachometer};
 use evtach_firmware::cost::{Costs, Spent};
 use evtach_firmware::intake::{self, BLOCKS, Block, Pace};
 use evtach_firmware::measure::measure;
@@ -34,13 +34,19 @@ static CHANNEL: StaticCell<Channel<'_, Mutex, Block>> = StaticCell::new();
 static STORE: StaticCell<[StoredEvent; DEVICE_EVENTS]> = StaticCell::new();
 static HEAT: ConstStaticCell<[u16; DEVICE_HEAT_CELLS]> =
     ConstStaticCell::new([0; DEVICE_HEAT_CELLS]);
+static WEIGHTS: ConstStaticCell<[u8; DEVICE_HEAT_CELLS]> =
+    ConstStaticCell::new([0; DEVICE_HEAT_CELLS]);
 static TACHOMETER: StaticCell<Tachometer<'_>> = StaticCell::new();
 static INTAKE: InterruptExecutor = InterruptExecutor::new();
 static MEASURE: InterruptExecutor = InterruptExecutor::new();
 
+/// Bytes of the heat map and its weights.
+const HEAT_BYTES: usize =
+    size_of::<[u16; DEVICE_HEAT_CELLS]>() + size_of::<[u8; DEVICE_HEAT_CELLS]>();
+
 // What the core may take of the 320 KB: the rest is for screen, links and stack.
 const _: () = {
-    assert!(size_of::<Tachometer<'_>>() + size_of::<[u16; DEVICE_HEAT_CELLS]>() <= 96 * 1024);
+    assert!(size_of::<Tachometer<'_>>() + HEAT_BYTES <= 96 * 1024);
     assert!(size_of::<[StoredEvent; DEVICE_EVENTS]>() <= 128 * 1024);
 };
 
@@ -58,16 +64,12 @@ fn main() -> ! {
         Ok(header) => header,
         Err(error) => fail(error),
     };
-    // `init_with`, because values of this size have no room on the stack: a copy there would fault.
-    let events = STORE.init_with(|| [StoredEvent::default(); DEVICE_EVENTS]);
-    let memory = Memory { events, heat: HEAT.take() };
-    let tachometer =
-        TACHOMETER.init_with(|| Tachometer::new(Settings::new(header.geometry), memory));
+    let tachometer = tachometer(header.geometry);
     let (sender, receiver) = CHANNEL.init(Channel::new(BUFFERS.take())).split();
 
     Irq::Measure.set_priority(&mut peripherals.NVIC, 0xC0);
     Irq::Intake.set_priority(&mut peripherals.NVIC, 0x80);
-    match (measure_all(tachometer, receiver, pace), take_in(file, header, pace, sender)) {
+    match (measure_all(tachometer, header, receiver, pace), take_in(file, header, pace, sender)) {
         (Ok(measure), Ok(intake)) => {
             MEASURE.start(Irq::Measure).spawn(measure);
             INTAKE.start(Irq::Intake).spawn(intake);
@@ -77,6 +79,17 @@ fn main() -> ! {
     loop {
         cortex_m::asm::wfi();
     }
+}
+
+/// The tachometer over the device's memory.
+///
+/// A function of its own, because parts of it are built on the stack first, and `main` never gives
+/// back what its frame takes.
+#[inline(never)]
+fn tachometer(geometry: Geometry) -> &'static mut Tachometer<'static> {
+    let events = STORE.init_with(|| [StoredEvent::default(); DEVICE_EVENTS]);
+    let memory = Memory { events, heat: HEAT.take(), weights: WEIGHTS.take() };
+    TACHOMETER.init_with(|| Tachometer::new(Settings::new(geometry), memory))
 }
 
 /// The file and the pace that the command line asks for.
@@ -115,6 +128,7 @@ async fn take_in(
 #[embassy_executor::task]
 async fn measure_all(
     tachometer: &'static mut Tachometer<'static>,
+    header: Header,
     mut blocks: Receiver<'static, Mutex, Block>,
     pace: Pace,
 ) {
@@ -126,14 +140,15 @@ async fn measure_all(
         writeln!(console, "{}spent push={push} poll={poll}", Lines(reading)).ok();
         console.flush();
     };
-    measure(tachometer, &mut blocks, pace, &mut costs, show).await;
+    measure(tachometer, &header, &mut blocks, pace, &mut costs, show).await;
     let mut console = Console::default();
     writeln!(
         console,
-        "{costs}memory tachometer={} store={} heat={} blocks={} stack={}",
+        "{costs}overrun events={}\nmemory tachometer={} store={} heat={} blocks={} stack={}",
+        tachometer.ignored().overrun,
         size_of::<Tachometer<'_>>(),
         size_of::<[StoredEvent; DEVICE_EVENTS]>(),
-        size_of::<[u16; DEVICE_HEAT_CELLS]>(),
+        HEAT_BYTES,
         size_of::<[Block; BLOCKS]>(),
         stack::deepest(),
     )

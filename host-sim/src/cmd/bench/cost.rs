@@ -43,7 +43,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let output = device::run(&image, played.geometry, &played.events, Pace::File)?;
         print_run(&played, &output);
         let live = device::run(&image, played.geometry, &played.events, Pace::Sensor)?;
-        print_live(&live);
+        print_live(&played, &live);
         memory = Some(output.memory);
     }
     if let Some(memory) = memory {
@@ -138,13 +138,15 @@ fn print_readings(output: &Output) {
     }
 }
 
-fn print_live(live: &Output) {
-    let lost: u64 = live.readings.iter().filter_map(|r| r.field("lost")?.parse::<u64>().ok()).sum();
+fn print_live(played: &Played, live: &Output) {
+    let lost = played.events.len() as u64 - live.events;
+    println!("  played live, at 250 million instructions per second:");
+    println!("  {:<24}{:>16}", "  readings", live.readings.len());
+    println!("  {:<24}{:>16} events found no free block", "  lost", grouped(lost));
     println!(
-        "  {:<24}{:>16} events, {} readings, at 250 million instructions per second",
-        "played live: lost",
-        grouped(lost),
-        live.readings.len()
+        "  {:<24}{:>16} events in windows given up",
+        "  measured too late",
+        grouped(live.overrun)
     );
     println!();
 }

@@ -26,7 +26,7 @@ use super::score::{Score, score};
 use super::spec;
 
 /// Counts the changes of [`scenes`]: results of different scenes must not be mixed in one file.
-const SCENES_VERSION: u32 = 1;
+const SCENES_VERSION: u32 = 2;
 
 /// Arguments of `evtach bench trust`.
 #[derive(clap::Args)]

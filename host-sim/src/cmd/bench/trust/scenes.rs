@@ -2,7 +2,7 @@
 //!
 //! A fifth without a rotor: shaken walls, bars and gratings, walkers, lamps, noise, and mixtures. The others: speeds from
 //! 60 to 60 000 rpm and 1 to 8 blades (at most 150 000 passages a minute), radii from 12 to 80 px, every shape, half from
-//! the hand or on a shaken table, a tenth each with a ramp, hunting, one odd blade, a lamp; a sixth with more than one
+//! the hand or on a shaken table, a tenth each with a ramp, hunting, one odd blade, a lamp (faint everywhere, or a deep spot); a sixth with more than one
 //! rotor; some cut by the frame, some tilted, some too short on purpose, a few with a saturated readout or lost polarity.
 
 use evtach_host::synth::presets::{hand, shaken, wall};
@@ -101,7 +101,12 @@ fn rotors(scene: &mut Scene, rng: &mut Pcg64Mcg) {
         if rng.random_bool(0.1) { rng.random_range(0.2..0.9) } else { rng.random_range(1.03..1.6) };
     scene.duration_ms = (needed * share * 1e3).min(2500.0);
     if rng.random_bool(0.1) {
-        scene.lamp = Some(lamp(rng, 0.3));
+        // All the light faintly, or a spot of it deeply.
+        let faint = rng.random::<bool>();
+        let mut light = lamp(rng, if faint { 0.12 } else { 0.3 });
+        let spot = [width / 2.0, height / 2.0, rng.random_range(30.0..90.0)];
+        light.spot_px = if faint { None } else { light.spot_px.or(Some(spot)) };
+        scene.lamp = Some(light);
     }
 }
 
@@ -161,6 +166,7 @@ fn nothing_turns(scene: &mut Scene, rng: &mut Pcg64Mcg) {
         }),
         4 => {
             scene.lamp = Some(lamp(rng, 0.6));
+            scene.duration_ms = scene.duration_ms.min(300.0);
             if rng.random_bool(0.3) {
                 scene.movers.push(bars(rng, false));
             }

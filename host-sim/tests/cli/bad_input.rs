@@ -1,0 +1,253 @@
+//! Bad input ends in a clear error or in a correct reading.
+
+use evtach_core::{Event, Polarity};
+
+use super::{assert_refused_as_bad, csv, evtach, folder, measure, noise, rotor, write};
+
+/// Head of a CSV that tells its size.
+const HEAD: &str = "%geometry:200,160\nt,x,y,p\n";
+
+/// The table shows the rotor of these tests.
+fn assert_reads_the_rotor(stdout: &str) {
+    let row = stdout.lines().find(|line| line.trim_start().starts_with("A "));
+    let row = row.unwrap_or_else(|| panic!("no rotor in: {stdout}"));
+    let rpm: f64 = row.split_whitespace().nth(1).and_then(|rpm| rpm.parse().ok()).expect("a speed");
+    assert!((rpm / 2400.0 - 1.0).abs() < 0.01, "{row}");
+    assert!(row.contains(" rpm cw "), "{row}");
+    assert!(row.contains(" 3 blades "), "{row}");
+}
+
+#[test]
+fn a_rotor_is_exit_code_0() {
+    let folder = folder();
+    let run = measure(&write(&folder, "rotor.raw", &rotor()));
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert_reads_the_rotor(&run.stdout);
+}
+
+#[test]
+fn no_rotor_is_exit_code_1_with_a_reason() {
+    let folder = folder();
+    let run = measure(&write(&folder, "noise.raw", &noise()));
+    assert_eq!(run.code, Some(1), "{}", run.stderr);
+    let last = run.stdout.lines().next_back().unwrap_or_default();
+    assert!(last.trim_start().starts_with("no reading: "), "{}", run.stdout);
+    assert!(last.ends_with(')'), "what to do stands in brackets: {last}");
+}
+
+#[test]
+fn empty_file() {
+    let folder = folder();
+    for name in ["empty.raw", "empty.csv", "empty.aedat4"] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, b"").expect("room on the disk");
+        assert_refused_as_bad(&measure(&path), "the file is empty");
+    }
+}
+
+#[test]
+fn header_without_events() {
+    let folder = folder();
+    for name in ["header.raw", "header.dat", "header.aedat4"] {
+        assert_refused_as_bad(&measure(&write(&folder, name, &[])), "no events");
+    }
+    // Two lines of text may be anything.
+    assert_refused_as_bad(&measure(&write(&folder, "header.csv", &[])), "text whose line 2 is");
+}
+
+#[test]
+fn text_file() {
+    let folder = folder();
+    let path = folder.path().join("letter.txt");
+    std::fs::write(&path, "Dear reader,\nthis is a letter, not a recording.\n").expect("room");
+    assert_refused_as_bad(&measure(&path), "letter.txt");
+}
+
+#[test]
+fn binary_file() {
+    let folder = folder();
+    let path = folder.path().join("picture.raw");
+    std::fs::write(&path, b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x01\0").expect("room on the disk");
+    assert_refused_as_bad(&measure(&path), "not a recording that is known here");
+}
+
+/// What lies before the cut is measured; that the file is cut is told.
+#[test]
+fn truncated_file() {
+    let folder = folder();
+    for name in ["cut.aedat4", "cut.raw", "cut.dat"] {
+        let path = write(&folder, name, &rotor());
+        let bytes = std::fs::read(&path).expect("the file just written");
+        // An odd number, so that a word is cut in two.
+        std::fs::write(&path, &bytes[..bytes.len() * 9 / 10 | 1]).expect("room on the disk");
+        let run = measure(&path);
+        assert_eq!(run.code, Some(0), "{name}: {}", run.stderr);
+        assert_reads_the_rotor(&run.stdout);
+        let told = ["cut", "truncat", "incomplete", "ends", "byte"];
+        assert!(told.iter().any(|word| run.stderr.contains(word)), "{name}: {}", run.stderr);
+    }
+}
+
+/// Cut within its header there is nothing to measure.
+#[test]
+fn truncated_header() {
+    let folder = folder();
+    let path = write(&folder, "stub.aedat4", &rotor());
+    let bytes = std::fs::read(&path).expect("the file just written");
+    std::fs::write(&path, &bytes[..20]).expect("room on the disk");
+    assert_refused_as_bad(&measure(&path), "stub.aedat4");
+}
+
+/// The size is inferred from the events, and that is told.
+#[test]
+fn no_geometry() {
+    let folder = folder();
+    let run = measure(&csv(&folder, "rotor.csv", "t,x,y,p\n", &rotor()));
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert_reads_the_rotor(&run.stdout);
+    assert!(run.stderr.contains("the file does not say its size"), "{}", run.stderr);
+    assert!(run.stderr.contains("--geometry"), "{}", run.stderr);
+}
+
+/// From a pipe it cannot be inferred: reading twice is not possible.
+#[test]
+fn no_geometry_from_a_pipe() {
+    let folder = folder();
+    let path = csv(&folder, "rotor.csv", "t,x,y,p\n", &rotor());
+    let bytes = std::fs::read(&path).expect("the file just written");
+    let run = evtach(&["measure", "-"], &bytes);
+    assert_refused_as_bad(&run, "--geometry WxH");
+    let run = evtach(&["measure", "--geometry", "200x160", "-"], &bytes);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert_reads_the_rotor(&run.stdout);
+}
+
+#[test]
+fn stdin() {
+    let folder = folder();
+    for name in ["rotor.raw", "rotor.dat", "rotor.aedat4"] {
+        let bytes = std::fs::read(write(&folder, name, &rotor())).expect("the file just written");
+        let run = evtach(&["measure", "-"], &bytes);
+        assert_eq!(run.code, Some(0), "{name}: {}", run.stderr);
+        assert_reads_the_rotor(&run.stdout);
+    }
+    assert_refused_as_bad(&evtach(&["measure", "-"], b""), "the file is empty");
+}
+
+#[test]
+fn events_outside_the_sensor() {
+    let folder = folder();
+    let mut events = rotor();
+    let wild: Vec<Event> =
+        events.iter().step_by(50).map(|e| Event { x: e.x + 3000, ..*e }).collect();
+    let count = wild.len();
+    events.extend(wild);
+    events.sort_by_key(|e| e.t_us);
+    let run = measure(&csv(&folder, "wild.csv", HEAD, &events));
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert_reads_the_rotor(&run.stdout);
+    let told = format!("{count} events outside the sensor left out");
+    assert!(run.stderr.contains(&told), "{}", run.stderr);
+    assert!(run.stderr.contains("--geometry"), "{}", run.stderr);
+}
+
+#[test]
+fn time_going_backwards() {
+    let folder = folder();
+    let mut events = rotor();
+    // Packets of two sources, merged carelessly: every hundredth event comes 3 ms late.
+    let mut stepped = 0;
+    for index in (0..events.len()).step_by(100) {
+        if events[index].t_us > 3_000 {
+            events[index].t_us -= 3_000;
+            stepped += 1;
+        }
+    }
+    let run = measure(&csv(&folder, "back.csv", HEAD, &events));
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert_reads_the_rotor(&run.stdout);
+    let told = format!("{stepped} events stepped back in time");
+    assert!(run.stderr.contains(&told), "{told}: {}", run.stderr);
+}
+
+/// A camera that was restarted while recording: the clock begins again.
+#[test]
+fn clock_that_starts_again() {
+    let folder = folder();
+    let first: Vec<Event> =
+        rotor().iter().map(|e| Event { t_us: e.t_us + 5_000_000, ..*e }).collect();
+    let events = [first, rotor()].concat();
+    let run = measure(&csv(&folder, "again.csv", HEAD, &events));
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert_reads_the_rotor(&run.stdout);
+}
+
+#[test]
+fn all_on_polarity() {
+    let folder = folder();
+    let events: Vec<Event> =
+        rotor().iter().map(|e| Event { polarity: Polarity::On, ..*e }).collect();
+    let run = measure(&write(&folder, "on.raw", &events));
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert_reads_the_rotor(&run.stdout);
+}
+
+#[test]
+fn missing_file_and_folder() {
+    let folder = folder();
+    assert_refused_as_bad(&measure(&folder.path().join("missing.raw")), "missing.raw");
+    assert_refused_as_bad(&measure(folder.path()), "this is a folder");
+}
+
+/// The good one is measured all the same; the exit code is the largest.
+#[test]
+fn one_of_two_files_fails() {
+    let folder = folder();
+    let good = write(&folder, "good.raw", &rotor()).display().to_string();
+    let silent = write(&folder, "noise.raw", &noise()).display().to_string();
+    let missing = folder.path().join("missing.raw").display().to_string();
+    for (files, code) in [
+        ([&good, &missing], 2),
+        ([&missing, &good], 2),
+        ([&good, &silent], 1),
+        ([&silent, &good], 1),
+        ([&good, &good], 0),
+        ([&silent, &missing], 2),
+    ] {
+        let run = evtach(&["measure", files[0], files[1]], b"");
+        assert_eq!(run.code, Some(code), "{files:?}: {}", run.stderr);
+        if files.contains(&&good) {
+            assert_reads_the_rotor(&run.stdout);
+        }
+    }
+}
+
+#[test]
+fn bad_usage() {
+    let folder = folder();
+    let good = write(&folder, "good.raw", &rotor()).display().to_string();
+    for args in [
+        vec!["measure"],
+        vec!["measure", "--geometry", "0x5", &good],
+        vec!["measure", "--roi", "1,2,3", &good],
+        vec!["measure", "--blades", "0", &good],
+        vec!["measure", "--window-ms", "1", &good],
+        vec!["measure", "--no-such-flag", &good],
+        vec!["no-such-command"],
+    ] {
+        let run = evtach(&args, b"");
+        assert_eq!(run.code, Some(2), "{args:?}: {}", run.stderr);
+        assert_eq!(run.stdout, "", "{args:?}");
+        let last = run.stderr.trim_end().lines().next_back().unwrap_or_default();
+        assert!(last.contains("--help"), "{args:?}: {}", run.stderr);
+    }
+}
+
+/// A region or a stretch without events is a mistake of the person, not a property of the recording.
+#[test]
+fn nothing_inside_the_region() {
+    let folder = folder();
+    let good = write(&folder, "good.raw", &rotor()).display().to_string();
+    let run = evtach(&["measure", "--start", "100", &good], b"");
+    assert_refused_as_bad(&run, "widen");
+}

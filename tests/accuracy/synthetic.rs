@@ -1,0 +1,199 @@
+//! Synthetic recordings with known truth, small enough to run everywhere.
+
+use evtach_core::{Direction, Event, Geometry, Polarity, Reason, Status};
+use evtach_host::measure::{Capacity, Summary};
+use evtach_host::synth::presets::Preset;
+use evtach_host::synth::{Model, Rotor, Scene, generate};
+use evtach_tests::{Loaded, Truth, measure, pair, show};
+
+/// Largest relative error of a speed.
+const LARGEST_ERROR: f64 = 0.01;
+
+/// Measures a scene in the device's capacities and compares it with its truth; returns what is wrong.
+fn wrong(name: &str, scene: &Scene) -> Vec<String> {
+    let made = generate(scene).expect("a scene in range");
+    let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
+    let loaded = Loaded { geometry, events: made.events };
+    let (_, summary) = measure(&loaded, Capacity::Device);
+    let truths: Vec<Truth> = made
+        .truth
+        .rotors
+        .iter()
+        .map(|rotor| Truth {
+            centre_px: rotor.centre_px,
+            radius_px: rotor.radius_px,
+            blades: rotor.blades,
+            rpm_camera: rotor.rpm_camera_mean_signed,
+            rpm_room: rotor.rpm_room_mean_signed,
+        })
+        .collect();
+    let (paired, ghosts) = pair(&truths, &summary);
+    let mut wrong = Vec::new();
+    for (truth, read) in truths.iter().zip(paired) {
+        let expected = truth.rpm_camera;
+        let Some((rotor, speed)) = read.and_then(|rotor| Some((rotor, rotor.speed?))) else {
+            wrong.push(format!("{name}: {expected:+.1} rpm x{}: no speed", truth.blades));
+            continue;
+        };
+        let rpm = match speed.direction() {
+            Direction::Cw => f64::from(speed.rpm()),
+            Direction::Ccw => -f64::from(speed.rpm()),
+        };
+        let error = rpm / expected - 1.0;
+        show(&format!(
+            "{name:<28} {expected:>+10.2} x{}  read {rpm:>+10.2} x{}  {:>+7.0} ppm  {}",
+            truth.blades,
+            rotor.blades.map_or("?".to_owned(), |n| n.to_string()),
+            error * 1e6,
+            rotor.status.as_str(),
+        ));
+        if !(error.abs() <= LARGEST_ERROR) {
+            wrong.push(format!("{name}: {expected:+.1} rpm read as {rpm:+.1}"));
+        }
+        if rotor.blades != Some(truth.blades) {
+            wrong.push(format!("{name}: {} blades read as {:?}", truth.blades, rotor.blades));
+        }
+    }
+    for ghost in ghosts {
+        let place = format!("({:.0}, {:.0})", ghost.x_px, ghost.y_px);
+        wrong.push(format!("{name}: a speed at {place}, where nothing turns"));
+    }
+    if truths.is_empty() {
+        refused(name, &summary, &mut wrong);
+    }
+    wrong
+}
+
+/// No speed, and a reason that tells the person about the scene.
+fn refused(name: &str, summary: &Summary, wrong: &mut Vec<String>) {
+    let told = [
+        Reason::NoEvents,
+        Reason::TooFewEvents,
+        Reason::NoRotation,
+        Reason::Flicker,
+        Reason::Ambiguous,
+        Reason::TooSlow,
+    ];
+    match summary.status {
+        Status::Refused(reason) if told.contains(&reason) => {
+            show(&format!("{name:<28} refused: {}", reason.as_str()));
+        }
+        other => wrong.push(format!("{name}: nothing turns, but the status is {other:?}")),
+    }
+}
+
+fn one(rotor: Rotor, model: Model, seed: u64) -> Scene {
+    Scene { rotors: vec![rotor], model, seed, duration_ms: 200.0, ..Scene::default() }
+}
+
+#[test]
+fn speeds_and_directions() {
+    let mut failures = Vec::new();
+    for (seed, rpm) in [900.0, -900.0, 3100.0, -3100.0, 11_000.0, -11_000.0].into_iter().enumerate()
+    {
+        for model in [Model::Threshold, Model::Edge] {
+            // The tips of a rotor this fast would leave no time between events at a radius of 50 px.
+            let radius_px = if f64::abs(rpm) > 10_000.0 { 30.0 } else { 50.0 };
+            let rotor = Rotor { rpm, radius_px, ..Rotor::default() };
+            failures.extend(wrong(&format!("{model:?}"), &one(rotor, model, 10 + seed as u64)));
+        }
+    }
+    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
+}
+
+#[test]
+fn blade_counts() {
+    let mut failures = Vec::new();
+    for blades in 1..=5 {
+        for model in [Model::Threshold, Model::Edge] {
+            let rotor = Rotor { blades, rpm: -1700.0, ..Rotor::default() };
+            failures
+                .extend(wrong(&format!("{model:?}"), &one(rotor, model, 20 + u64::from(blades))));
+        }
+    }
+    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
+}
+
+#[test]
+fn scenes_with_rotors() {
+    let mut failures = Vec::new();
+    for preset in [Preset::OddBlade, Preset::Handheld, Preset::Quad, Preset::Vibrating] {
+        let scene = Scene { seed: 31, duration_ms: 200.0, ..preset.scene() };
+        failures.extend(wrong(&format!("{preset:?}"), &scene));
+    }
+    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
+}
+
+#[test]
+fn scenes_without_rotors() {
+    let mut failures = Vec::new();
+    for preset in [Preset::Still, Preset::Flicker, Preset::Bar, Preset::Noise] {
+        for seed in [41, 42] {
+            let scene = Scene { seed, ..preset.scene() };
+            failures.extend(wrong(&format!("{preset:?}"), &scene));
+        }
+    }
+    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
+}
+
+/// Sense of rotation of [`arms`].
+#[derive(Clone, Copy)]
+enum Turn {
+    /// atan2(y, x) grows.
+    Growing,
+    /// atan2(y, x) shrinks.
+    Shrinking,
+}
+
+/// Events without any synthesiser: two arms of points that step from pixel to pixel, their angle atan2(y, x)
+/// growing with time. With y pointing down that is clockwise as one looks at the screen.
+fn arms(turn: Turn, rpm: f64) -> Loaded {
+    let omega_rad_s = rpm / 60.0 * std::f64::consts::TAU;
+    let mut events = Vec::new();
+    let mut last = [[(0_u16, 0_u16); 40]; 2];
+    for t_us in (0..200_000_u64).step_by(10) {
+        let angle = omega_rad_s * t_us as f64 * 1e-6;
+        for (arm, last) in last.iter_mut().enumerate() {
+            let angle = angle + std::f64::consts::PI * arm as f64;
+            for (step, last) in last.iter_mut().enumerate() {
+                let radius_px = 15.0 + step as f64;
+                let (x, up) = (100.0 + radius_px * angle.cos(), radius_px * angle.sin());
+                let y = match turn {
+                    Turn::Growing => 100.0 + up,
+                    Turn::Shrinking => 100.0 - up,
+                };
+                let place = (x.round() as u16, y.round() as u16);
+                if place != *last {
+                    *last = place;
+                    events.push(Event { t_us, x: place.0, y: place.1, polarity: Polarity::On });
+                }
+            }
+        }
+    }
+    Loaded { geometry: Geometry::new(200, 200).expect("a sensor in range"), events }
+}
+
+#[test]
+fn growing_angle_is_clockwise() {
+    for (turn, direction) in [(Turn::Growing, Direction::Cw), (Turn::Shrinking, Direction::Ccw)] {
+        let (_, summary) = measure(&arms(turn, 1234.0), Capacity::Device);
+        let [rotor] = &summary.rotors[..] else { panic!("one rotor: {summary:?}") };
+        let speed = rotor.speed.expect("a speed");
+        assert_eq!(speed.direction(), direction);
+        assert!((f64::from(speed.rpm()) / 1234.0 - 1.0).abs() < LARGEST_ERROR, "{speed:?}");
+    }
+}
+
+/// The synthesiser and its truth file use the same sense.
+#[test]
+fn positive_rpm_of_a_scene_is_clockwise() {
+    for (rpm, name) in [(2000.0, "cw"), (-2000.0, "ccw")] {
+        let scene = one(Rotor { rpm, ..Rotor::default() }, Model::Edge, 50);
+        let made = generate(&scene).expect("a scene in range");
+        assert_eq!(made.truth.rotors[0].direction, name);
+        let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
+        let (_, summary) = measure(&Loaded { geometry, events: made.events }, Capacity::Full);
+        let speed = summary.rotors[0].speed.expect("a speed");
+        assert_eq!(speed.direction().as_str(), name);
+    }
+}
