@@ -363,6 +363,13 @@ fn aedat3_packets() {
     let found = read_bytes("a.aedat", &bytes, None).expect("AEDAT3");
     assert_eq!(found.events, [event(7, 3, 4, true), event((2 << 31) + 5, 239, 179, false)]);
     assert_eq!(found.recording.geometry, Geometry { width_px: 240, height_px: 180 });
+    // Packets of other kinds may hold events of any size.
+    let mut other = packet(9, 0, &[[0, 0]]);
+    other[4..8].copy_from_slice(&1_i32.to_le_bytes());
+    other.truncate(28 + 1);
+    let with_other = [header.as_bytes(), &other, &packet(1, 0, &[[pixel(3, 4, 1), 7]])].concat();
+    let found = read_bytes("a.aedat", &with_other, None).expect("AEDAT3");
+    assert_eq!(found.events, [event(7, 3, 4, true)]);
     let cut = read_bytes("a.aedat", &bytes[..bytes.len() - 1], None).expect("AEDAT3");
     assert_eq!((cut.events.len(), cut.recording.side().notes.len()), (1, 1));
 }

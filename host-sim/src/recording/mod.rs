@@ -151,11 +151,14 @@ impl Recording {
     /// Drops and counts what lies outside the sensor, counts steps back in time.
     fn check(&mut self, events: &mut Vec<Event>, first: usize) {
         let geometry = self.geometry;
-        let mut outside = false;
+        let (mut outside, mut steps_back, mut last_us) = (false, 0, self.last_us);
         for event in &events[first..] {
             outside |= !geometry.contains(event.x, event.y);
+            steps_back += u64::from(event.t_us < last_us);
+            last_us = event.t_us;
         }
         if outside {
+            // Rare: go over them again without those.
             let before = events.len();
             let mut index = 0;
             events.retain(|event| {
@@ -164,11 +167,14 @@ impl Recording {
                 keep
             });
             self.out_of_bounds += (before - events.len()) as u64;
+            (steps_back, last_us) = (0, self.last_us);
+            for event in &events[first..] {
+                steps_back += u64::from(event.t_us < last_us);
+                last_us = event.t_us;
+            }
         }
-        for event in &events[first..] {
-            self.out_of_order += u64::from(event.t_us < self.last_us);
-            self.last_us = event.t_us;
-        }
+        self.out_of_order += steps_back;
+        self.last_us = last_us;
     }
 
     /// Events so far that stepped back in time relative to the one before.

@@ -25,6 +25,8 @@ pub struct Args {
     json: bool,
 }
 
+/// Sensor of the recording that is made up.
+const MADE_UP: Geometry = Geometry { width_px: 640, height_px: 480 };
 /// Times a file is decoded; the best counts.
 const RUNS: usize = 5;
 
@@ -50,7 +52,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     } else {
         args.files.clone()
     };
-    let rows: anyhow::Result<Vec<Row>> = files.iter().map(|file| row(file, &args.python)).collect();
+    // Text and arrays do not tell the size; faery does not look for it either.
+    let options = OpenOptions { geometry: args.files.is_empty().then_some(MADE_UP) };
+    let rows: anyhow::Result<Vec<Row>> =
+        files.iter().map(|file| row(file, &options, &args.python)).collect();
     if args.files.is_empty() {
         // What is left behind is the system's to clean up.
         let _ = std::fs::remove_dir_all(&folder);
@@ -61,7 +66,6 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 
 /// Edges of a fan's blades: neighbouring pixels of a row within a microsecond or two, as vectors of EVT 3 want them.
 fn make_up(folder: &Path, mega_events: u32) -> anyhow::Result<Vec<PathBuf>> {
-    let geometry = Geometry { width_px: 640, height_px: 480 };
     let mut mixed = 0x9e37_79b9_7f4a_7c15_u64;
     let mut t_us = 0;
     let (mut x, mut y) = (0, 0);
@@ -75,7 +79,7 @@ fn make_up(folder: &Path, mega_events: u32) -> anyhow::Result<Vec<PathBuf>> {
                 x = (mixed >> 16) as u16 % 632;
                 y = (mixed >> 32) as u16 % 480;
             } else {
-                x = (x + 1) % geometry.width_px;
+                x = (x + 1) % MADE_UP.width_px;
             }
             let polarity = if mixed >> 48 & 1 == 1 { Polarity::On } else { Polarity::Off };
             Event { t_us, x, y, polarity }
@@ -90,7 +94,7 @@ fn make_up(folder: &Path, mega_events: u32) -> anyhow::Result<Vec<PathBuf>> {
                 other => other.as_str(),
             };
             let path = folder.join(format!("events.{extension}"));
-            let mut writer = write::create(&path, format, geometry)?;
+            let mut writer = write::create(&path, format, MADE_UP)?;
             writer.write(&events)?;
             writer.finish()?;
             Ok(path)
@@ -98,15 +102,14 @@ fn make_up(folder: &Path, mega_events: u32) -> anyhow::Result<Vec<PathBuf>> {
         .collect()
 }
 
-fn row(file: &Path, python: &Path) -> anyhow::Result<Row> {
+fn row(file: &Path, options: &OpenOptions, python: &Path) -> anyhow::Result<Row> {
     let name = file.display().to_string();
     let bytes = std::fs::metadata(file).with_context(|| name.clone())?.len();
     let mut best_s = f64::INFINITY;
     let (mut events, mut format) = (0, "");
     for _ in 0..RUNS {
         let start = Instant::now();
-        let mut recording =
-            recording::open(file, &OpenOptions::default()).with_context(|| name.clone())?;
+        let mut recording = recording::open(file, options).with_context(|| name.clone())?;
         let mut chunk: Vec<Event> = Vec::new();
         events = 0;
         loop {

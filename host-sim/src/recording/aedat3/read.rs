@@ -138,24 +138,36 @@ impl Source for Packets {
         let available = bytes.len();
         // A cut packet still has its first events.
         let body = &bytes[HEADER_BYTES..available.min(HEADER_BYTES + size)];
-        for event in body.chunks_exact(header.event_bytes) {
-            let info = u32::from_le_bytes([event[0], event[1], event[2], event[3]]);
-            // Bit 0 marks events that a filter has not thrown out.
-            if info & 1 == 0 {
-                continue;
-            }
-            match header.kind {
-                TYPE_POLARITY => {
-                    events.push(polarity_event(info, header.time(event, 4), self.flip))
-                }
-                TYPE_IMU6 => side.imu.push(imu_sample(event, header.time(event, 4))),
-                _ => {}
+        if matches!(header.kind, TYPE_POLARITY | TYPE_IMU6) {
+            for event in body.chunks_exact(header.event_bytes) {
+                take(event, &header, self.flip, events, &mut side.imu);
             }
         }
         side.wraps = side.wraps.max(u64::from(header.overflow));
         let whole = available >= HEADER_BYTES + size;
         self.input.consume((HEADER_BYTES + size).min(available));
         if whole { Ok(true) } else { cut(side, available) }
+    }
+}
+
+/// Takes in one event of a packet of polarity events or inertial samples, which has at least its info and time.
+fn take(
+    event: &[u8],
+    header: &PacketHeader,
+    flip: Option<Geometry>,
+    events: &mut Vec<Event>,
+    imu: &mut Vec<ImuSample>,
+) {
+    let info = u32::from_le_bytes([event[0], event[1], event[2], event[3]]);
+    // Bit 0 marks events that a filter has not thrown out.
+    if info & 1 == 0 {
+        return;
+    }
+    let t_us = header.time(event, 4);
+    if header.kind == TYPE_POLARITY {
+        events.push(polarity_event(info, t_us, flip));
+    } else {
+        imu.push(imu_sample(event, t_us));
     }
 }
 

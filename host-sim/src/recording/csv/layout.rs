@@ -59,9 +59,14 @@ pub struct Layout {
     pub assumed: Vec<String>,
 }
 
-/// Fields of a line: commas, semicolons, tabs and runs of blanks all separate.
+/// Whether a byte separates fields: commas, semicolons, tabs and runs of blanks all do.
+pub const fn separates(byte: u8) -> bool {
+    matches!(byte, b',' | b';' | b'\t' | b' ' | b'\r')
+}
+
+/// Fields of a line.
 pub fn fields(line: &str) -> impl Iterator<Item = &str> {
-    line.split([',', ';', '\t', ' ', '\r']).filter(|field| !field.is_empty())
+    line.split(|c: char| u8::try_from(c).is_ok_and(separates)).filter(|field| !field.is_empty())
 }
 
 /// Finds the layout from the first lines of a file.
@@ -226,8 +231,9 @@ fn columns_from_rows(rows: &[Vec<&str>]) -> [usize; 4] {
         row.get(column).and_then(|field| field.parse::<f64>().ok()).unwrap_or(f64::NAN)
     };
     let is_polarity = |column: usize| {
-        rows.iter()
-            .all(|row| row.get(column).is_some_and(|field| super::read::polarity(field).is_some()))
+        rows.iter().all(|row| {
+            row.get(column).is_some_and(|field| super::read::polarity(field.as_bytes()).is_some())
+        })
     };
     // Last, then third: the places in use.
     let p = [3, 2, 0, 1].into_iter().find(|&column| is_polarity(column)).unwrap_or(3);

@@ -103,18 +103,26 @@ fn event(line: &[u8], layout: &Layout) -> Result<Option<Event>, String> {
     if line.is_empty() || line[0] == b'#' || line[0] == b'%' {
         return Ok(None);
     }
-    let text = std::str::from_utf8(line).map_err(|_| "not text".to_owned())?;
-    let mut found: [Option<&str>; 4] = [None; 4];
-    for (index, field) in layout::fields(text).enumerate() {
-        if let Some(place) = layout.columns.iter().position(|&column| column == index) {
-            found[place] = Some(field);
+    let mut found: [&[u8]; 4] = [&[]; 4];
+    let mut rest = line;
+    for index in 0.. {
+        let start = rest.iter().position(|&byte| !layout::separates(byte)).unwrap_or(rest.len());
+        rest = &rest[start..];
+        if rest.is_empty() {
+            break;
         }
+        let end = rest.iter().position(|&byte| layout::separates(byte)).unwrap_or(rest.len());
+        if let Some(place) = layout.columns.iter().position(|&column| column == index) {
+            found[place] = &rest[..end];
+        }
+        rest = &rest[end..];
     }
-    let [Some(t), Some(x), Some(y), Some(p)] = found else {
+    let [t, x, y, p] = found;
+    if found.iter().any(|field| field.is_empty()) {
         return Err("fewer columns than the lines before".to_owned());
-    };
-    let bad = |name: &str, field: &str| {
-        let shown: String = field.chars().take(20).collect();
+    }
+    let bad = |name: &str, field: &[u8]| {
+        let shown: String = String::from_utf8_lossy(field).chars().take(20).collect();
         format!("{name} is \"{shown}\"")
     };
     Ok(Some(Event {
@@ -125,12 +133,27 @@ fn event(line: &[u8], layout: &Layout) -> Result<Option<Event>, String> {
     }))
 }
 
-/// A pixel coordinate; one off the sensor's address range becomes `u16::MAX`, which is counted as out of bounds.
-fn pixel(field: &str) -> Option<u16> {
-    if let Ok(value) = field.parse::<u16>() {
-        return Some(value);
+/// A number of digits only.
+fn digits(field: &[u8]) -> Option<u64> {
+    if field.is_empty() || field.len() > 19 {
+        return None;
     }
-    let value: f64 = field.parse().ok()?;
+    field.iter().try_fold(0_u64, |value, byte| {
+        let digit = byte.wrapping_sub(b'0');
+        (digit < 10).then(|| value * 10 + u64::from(digit))
+    })
+}
+
+fn float(field: &[u8]) -> Option<f64> {
+    std::str::from_utf8(field).ok()?.parse().ok()
+}
+
+/// A pixel coordinate; one off the sensor's address range becomes `u16::MAX`, which is counted as out of bounds.
+fn pixel(field: &[u8]) -> Option<u16> {
+    if let Some(value) = digits(field) {
+        return Some(u16::try_from(value).unwrap_or(u16::MAX));
+    }
+    let value = float(field)?;
     if !value.is_finite() {
         return None;
     }
@@ -139,13 +162,15 @@ fn pixel(field: &str) -> Option<u16> {
 }
 
 /// Brighter or darker from 0/1, -1/1 and words.
-pub(super) fn polarity(field: &str) -> Option<Polarity> {
+pub(super) fn polarity(field: &[u8]) -> Option<Polarity> {
     match field {
-        "1" | "+1" | "true" | "True" | "TRUE" | "on" | "ON" => return Some(Polarity::On),
-        "0" | "-1" | "false" | "False" | "FALSE" | "off" | "OFF" => return Some(Polarity::Off),
+        b"1" | b"+1" | b"true" | b"True" | b"TRUE" | b"on" | b"ON" => return Some(Polarity::On),
+        b"0" | b"-1" | b"false" | b"False" | b"FALSE" | b"off" | b"OFF" => {
+            return Some(Polarity::Off);
+        }
         _ => {}
     }
-    let value: f64 = field.parse().ok()?;
+    let value = float(field)?;
     if value == 1.0 {
         Some(Polarity::On)
     } else if value == 0.0 || value == -1.0 {
@@ -156,26 +181,27 @@ pub(super) fn polarity(field: &str) -> Option<Polarity> {
 }
 
 /// A time in microseconds, exact for plain decimals and rounded to the nearest microsecond.
-fn microseconds(field: &str, exponent: i32) -> Option<u64> {
+fn microseconds(field: &[u8], exponent: i32) -> Option<u64> {
     if exponent == 0
-        && let Ok(value) = field.parse::<u64>()
+        && let Some(value) = digits(field)
     {
         return Some(value);
     }
-    let (whole, fraction) = field.split_once('.').unwrap_or((field, ""));
-    let digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
-    if exponent >= 0 && !whole.is_empty() && digits(whole) && digits(fraction) {
-        let exponent = exponent.unsigned_abs() as usize;
-        let mut value: u64 = whole.parse().ok()?;
-        let mut rest = fraction.bytes();
+    let point = memchr::memchr(b'.', field).unwrap_or(field.len());
+    let (whole, fraction) = (&field[..point], field.get(point + 1..).unwrap_or_default());
+    if exponent >= 0
+        && let Some(mut value) = digits(whole)
+        && fraction.iter().all(u8::is_ascii_digit)
+    {
+        let mut rest = fraction.iter();
         for _ in 0..exponent {
             let digit = rest.next().map_or(0, |byte| byte - b'0');
             value = value.checked_mul(10)?.checked_add(u64::from(digit))?;
         }
-        let up = rest.next().is_some_and(|byte| byte >= b'5');
+        let up = rest.next().is_some_and(|&byte| byte >= b'5');
         return value.checked_add(u64::from(up));
     }
-    let value = field.parse::<f64>().ok()? * 10f64.powi(exponent);
+    let value = float(field)? * 10f64.powi(exponent);
     (0.0..9e18).contains(&value).then(|| value.round() as u64)
 }
 
@@ -185,23 +211,23 @@ mod tests {
 
     #[test]
     fn seconds_become_microseconds_exactly() {
-        assert_eq!(microseconds("1468941032.229165", 6), Some(1_468_941_032_229_165));
-        assert_eq!(microseconds("0.0000015", 6), Some(2));
-        assert_eq!(microseconds("3", 6), Some(3_000_000));
-        assert_eq!(microseconds("1.5e-3", 6), Some(1500));
-        assert_eq!(microseconds("1500", -3), Some(2));
-        assert_eq!(microseconds("1.304124000000000000e+06", 0), Some(1_304_124));
+        assert_eq!(microseconds(b"1468941032.229165", 6), Some(1_468_941_032_229_165));
+        assert_eq!(microseconds(b"0.0000015", 6), Some(2));
+        assert_eq!(microseconds(b"3", 6), Some(3_000_000));
+        assert_eq!(microseconds(b"1.5e-3", 6), Some(1500));
+        assert_eq!(microseconds(b"1500", -3), Some(2));
+        assert_eq!(microseconds(b"1.304124000000000000e+06", 0), Some(1_304_124));
         for text in ["", "-1", "nan", "inf", "1e99", "abc", "99999999999999999999"] {
-            assert_eq!(microseconds(text, 6), None, "{text}");
+            assert_eq!(microseconds(text.as_bytes(), 6), None, "{text}");
         }
     }
 
     #[test]
     fn pixels_off_any_sensor_stay_off_it() {
-        assert_eq!(pixel("12"), Some(12));
-        assert_eq!(pixel("12.0"), Some(12));
-        assert_eq!(pixel("-1"), Some(u16::MAX));
-        assert_eq!(pixel("1e9"), Some(u16::MAX));
-        assert_eq!(pixel("nan"), None);
+        assert_eq!(pixel(b"12"), Some(12));
+        assert_eq!(pixel(b"12.0"), Some(12));
+        assert_eq!(pixel(b"-1"), Some(u16::MAX));
+        assert_eq!(pixel(b"1e9"), Some(u16::MAX));
+        assert_eq!(pixel(b"nan"), None);
     }
 }

@@ -73,11 +73,24 @@ impl Kind {
     /// The number at the start of `bytes`; missing bytes count as zero.
     #[inline]
     pub fn read(self, bytes: &[u8]) -> Number {
-        let mut value = 0_u64;
-        for index in 0..self.bytes {
-            let at = if self.big_endian { index } else { self.bytes - 1 - index };
-            value = value << 8 | u64::from(bytes.get(at).copied().unwrap_or(0));
-        }
+        let part = |length: usize| {
+            let mut all = [0; 8];
+            let bytes = &bytes[..bytes.len().min(length)];
+            all[..bytes.len()].copy_from_slice(bytes);
+            u64::from_le_bytes(all)
+        };
+        // Lengths known to the compiler make plain loads of these.
+        let little = match self.bytes {
+            1 => part(1),
+            2 => part(2),
+            4 => part(4),
+            _ => part(8),
+        };
+        let value = if self.big_endian {
+            little.swap_bytes() >> (64 - 8 * self.bytes as u32)
+        } else {
+            little
+        };
         let unused = 64 - 8 * self.bytes as u32;
         match self.class {
             Class::Unsigned => Number::Unsigned(value),

@@ -168,6 +168,9 @@ impl Arrays {
 
 /// A coordinate; one off any sensor becomes `u16::MAX`, which is counted as out of bounds.
 fn pixel(number: Number) -> u16 {
+    if let Number::Unsigned(value) = number {
+        return u16::try_from(value).unwrap_or(u16::MAX);
+    }
     let value = number.as_f64();
     if (0.0..65535.0).contains(&value) { value as u16 } else { u16::MAX }
 }
@@ -175,7 +178,8 @@ fn pixel(number: Number) -> u16 {
 fn microseconds(number: Number, unit: Unit) -> Option<u64> {
     let exponent = unit.exponent();
     match number {
-        Number::Unsigned(value) if exponent >= 0 => {
+        Number::Unsigned(value) if exponent == 0 => Some(value),
+        Number::Unsigned(value) if exponent > 0 => {
             value.checked_mul(10_u64.pow(exponent.unsigned_abs()))
         }
         Number::Unsigned(value) => Some(value / 10_u64.pow(exponent.unsigned_abs())),

@@ -9,7 +9,7 @@ use crate::recording::prophesee_header::{Header, find_further};
 use crate::recording::{Opened, Side, Source};
 
 /// Bytes decoded in one go.
-const CHUNK_BYTES: usize = 64 * 1024;
+const CHUNK_BYTES: usize = 32 * 1024;
 /// Bytes looked at behind a chunk, so that a header across its border is seen.
 const OVERLAP_BYTES: usize = 2048;
 
