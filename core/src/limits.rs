@@ -24,8 +24,8 @@ pub const SCAN_BINS: usize = 1_024;
 /// Cells of the coherence map: 1 536 x 20 B = 30 KiB; 44 x 33 cells of 8 px cover a 346x260 sensor.
 pub const COHERENCE_CELLS: usize = 1_536;
 
-/// Phasors in one look for a winding: 192 x 24 B = 4.5 KiB.
-pub const WINDING_PHASORS: usize = 192;
+/// Phasors in one look for a winding: 128 x 24 B = 3 KiB.
+pub const WINDING_PHASORS: usize = 128;
 
 /// Events in a slice for registration: 2 x 512 x 16 B = 16 KiB.
 pub const SLICE_POINTS: usize = 512;

@@ -307,10 +307,10 @@ impl<'m> Store<'m> {
     ) -> Segment {
         let mut weight = 0_u64;
         let mut stride_log2 = Segment::default().stride_log2;
-        for i in from..=self.closed {
+        for (i, segment) in old.iter().enumerate().take(self.closed + 1).skip(from) {
             let source = self.slot(i) * self.capacity;
             let skipped = if i == from { index + self.burst() } else { 0 };
-            for event in &self.events[source..source + old[i].len][skipped.min(old[i].len)..] {
+            for event in &self.events[source..source + segment.len][skipped.min(segment.len)..] {
                 if event.since(self.start_us) >= end_us {
                     break;
                 }

@@ -1,9 +1,9 @@
 //! The one front door: events in, readings out.
 //!
 //! [`Tachometer::push`] takes in events and never waits; [`Tachometer::poll`] advances the measurement of a full
-//! window in bounded steps. Readings are functions of the events, their times and the capacities alone,
-//! as long as a window is measured before [`SPARE_SEGMENTS`] more segments have filled; one that is
-//! not is given up and counted.
+//! window in bounded steps. A reading is a function of the events of its window, their times and the capacities alone.
+//! Which windows are measured depends on speed only when a measurement takes longer than [`SPARE_SEGMENTS`]
+//! segments: then events are left out and counted until it ends, and the next window starts afresh.
 
 use heapless::Vec;
 
@@ -132,11 +132,12 @@ pub struct Ignored {
     pub out_of_roi: u64,
     /// Older than the event before, or from a future that no clock reaches.
     pub out_of_order: u64,
-    /// Arrived while a measurement held the store for too long; the window was given up.
+    /// Arrived while the store was full because a measurement had not ended.
     pub overrun: u64,
 }
 
 #[derive(Debug, Default)]
+#[expect(clippy::large_enum_variant, reason = "no heap to box the larger one on")]
 enum Job {
     #[default]
     Idle,
@@ -144,6 +145,14 @@ enum Job {
     Search(Extraction),
     /// Measuring candidate number `0`.
     Measure(usize, Measurement),
+}
+
+/// A place to measure.
+#[derive(Clone, Copy, Debug)]
+struct Suspect {
+    found: Found,
+    /// Blade count, and whether the blades are alike, of a rotor that was locked in the window before.
+    followed: Option<(Option<u8>, bool)>,
 }
 
 /// Memory that is used by one job at a time.
@@ -168,6 +177,8 @@ pub struct Tachometer<'m> {
     window_segments: usize,
     /// End of the stored events when the measurement started: a last window may not be full.
     window_end_us: u64,
+    /// Whether the store has filled before the measurement ended.
+    overrun: bool,
     /// Whether the last reading was a lock, so that the rest of a stream need not be looked at.
     satisfied: bool,
     ignored: Ignored,
@@ -175,7 +186,7 @@ pub struct Tachometer<'m> {
     polar: PolarTrack,
     scanner: Scanner,
     scratch: Scratch,
-    candidates: Vec<(Found, Option<(Option<u8>, bool)>), MAX_CANDIDATES>,
+    candidates: Vec<Suspect, MAX_CANDIDATES>,
     outcomes: Vec<Outcome, MAX_ROTORS>,
     in_step_hz: Option<f32>,
     tracker: Tracker,
@@ -198,6 +209,7 @@ impl<'m> Tachometer<'m> {
             target_us: settings.window_us.unwrap_or(BASE_WINDOW_US),
             window_segments: 0,
             window_end_us: 0,
+            overrun: false,
             satisfied: false,
             ignored: Ignored::default(),
             job: Job::Idle,
@@ -244,8 +256,12 @@ impl<'m> Tachometer<'m> {
             self.restart(event.t_us);
         }
         self.last_us = event.t_us;
-        if event.t_us >= self.store.open_end_us() {
+        if event.t_us >= self.store.open_end_us() && !self.overrun {
             self.advance(event.t_us);
+        }
+        if self.overrun {
+            self.ignored.overrun += 1;
+            return;
         }
         self.heat.add(event.x, event.y);
         self.store.push(event);
@@ -254,33 +270,27 @@ impl<'m> Tachometer<'m> {
     /// Forgets the window; rotors keep their letters.
     fn restart(&mut self, t_us: u64) {
         self.started = true;
-        self.give_up();
+        self.overrun = false;
+        self.window_segments = 0;
+        self.job = Job::Idle;
         self.target_us = self.settings.window_us.unwrap_or(BASE_WINDOW_US);
         self.store.restart(t_us, segment_us(FIRST_WINDOW_US.min(self.target_us)));
         self.heat.clear();
         self.until_search = 0;
     }
 
-    fn give_up(&mut self) {
-        if self.window_segments > 0 {
-            self.ignored.overrun += self.store.account(self.window_segments).counted;
-        }
-        self.window_segments = 0;
-        self.job = Job::Idle;
-    }
-
     /// Closes segments until the open one holds `t_us`.
     fn advance(&mut self, t_us: u64) {
         let gap_us = t_us - self.store.open_end_us();
-        if gap_us > u64::from(LONGEST_WINDOW_US) {
+        if gap_us > u64::from(LONGEST_WINDOW_US) && self.window_segments == 0 {
             // Nothing for longer than any window: what went before says nothing about what comes.
             self.restart(t_us);
             return;
         }
         while t_us >= self.store.open_end_us() {
             if self.store.full() {
-                self.give_up();
-                self.store.drop_oldest();
+                self.overrun = true;
+                return;
             }
             self.store.close_segment();
             let window_us = self.store.segment_us() * WINDOW_SEGMENTS as u32;
@@ -304,7 +314,8 @@ impl<'m> Tachometer<'m> {
         weigh_heat(self.heat.counts(), self.weights);
         let known = self.tracker.known().iter().filter(|known| known.can_be_followed());
         for known in known {
-            self.candidates.push((known.found, Some((known.parts, known.alike)))).ok();
+            let followed = Some((known.parts, known.alike));
+            self.candidates.push(Suspect { found: known.found, followed }).ok();
         }
         if self.until_search == 0 || self.candidates.is_empty() {
             self.candidates.clear();
@@ -399,7 +410,7 @@ impl<'m> Tachometer<'m> {
                 if extraction.step(&view, &mut self.polar, &mut self.scanner, scratch) {
                     self.in_step_hz = extraction.in_step_hz();
                     for candidate in extraction.candidates() {
-                        self.candidates.push((*candidate, None)).ok();
+                        self.candidates.push(Suspect { found: *candidate, followed: None }).ok();
                     }
                     return self.measure_next(0);
                 }
@@ -415,7 +426,7 @@ impl<'m> Tachometer<'m> {
                     return false;
                 }
                 let (index, outcome) = (*index, measurement.result());
-                let followed = self.candidates.get(index).is_some_and(|c| c.1.is_some());
+                let followed = self.candidates.get(index).is_some_and(|c| c.followed.is_some());
                 if followed && outcome.status != Status::Locked {
                     // Lost: look at the whole image again, in this very window.
                     self.candidates.clear();
@@ -458,7 +469,7 @@ impl<'m> Tachometer<'m> {
             self.outcomes.iter().filter(measured).any(|o| o.found.disc.overlaps(disc))
         };
         let next = (index..self.candidates.len().min(MOST_MEASURED))
-            .find(|i| !taken(&self.candidates[*i].0.disc));
+            .find(|i| !taken(&self.candidates[*i].found.disc));
         let Some(next) = next else {
             self.job = Job::Idle;
             return true;
@@ -466,8 +477,8 @@ impl<'m> Tachometer<'m> {
         if !matches!(self.scratch, Scratch::Measure(_)) {
             self.scratch = Scratch::Measure(Icp::default());
         }
-        let (found, known) = self.candidates[next];
-        let measurement = match known {
+        let Suspect { found, followed } = self.candidates[next];
+        let measurement = match followed {
             Some((parts, alike)) => Measurement::follow(&found, parts, alike),
             None => Measurement::new(&found),
         };
@@ -516,6 +527,13 @@ impl<'m> Tachometer<'m> {
         self.window_segments = 0;
         self.job = Job::Idle;
         self.satisfied = status == Status::Locked;
+        if self.overrun {
+            // There is a hole behind what is stored. What is known of the rotors still holds.
+            let until_search = self.until_search;
+            self.restart(self.last_us);
+            self.until_search = until_search;
+            return;
+        }
         let window_us = self.store.segment_us() * WINDOW_SEGMENTS as u32;
         let wanted = self.outcomes.iter().map(|o| o.wanted_us).fold(0.0, f32::max);
         let wanted =

@@ -14,6 +14,8 @@ const SETTLED_RAD: f32 = 1e-4;
 const LEAST_MATCHES: usize = 12;
 /// Matches farther than this in pixels are not used.
 const REACH_PX: f32 = 12.0;
+/// Half the side of the neighbour grid in radii of the rotor.
+const REACH_RADII: f32 = 1.2;
 /// Residuals beyond this many root mean squares of the iteration before are not used.
 const TRIM: f32 = 2.5;
 
@@ -61,10 +63,30 @@ impl Icp {
         radius_px: f32,
         residual: Residual,
     ) -> Option<Registered> {
-        let reach_px = 1.2 * radius_px;
-        self.grid.build(&self.second, reach_px);
-        let there = one_way(&self.first, &self.second, &self.grid, start_rad, radius_px, residual)?;
-        self.grid.build(&self.first, reach_px);
+        let there = self.there(start_rad, radius_px, residual)?;
+        self.back(there, start_rad, radius_px, residual)
+    }
+
+    /// The first half of [`Self::both_ways`]: the first slice onto the second.
+    pub fn there(
+        &mut self,
+        start_rad: f32,
+        radius_px: f32,
+        residual: Residual,
+    ) -> Option<Registered> {
+        self.grid.build(&self.second, REACH_RADII * radius_px);
+        one_way(&self.first, &self.second, &self.grid, start_rad, radius_px, residual)
+    }
+
+    /// The second half of [`Self::both_ways`]: the second slice onto the first, averaged with the first half.
+    pub fn back(
+        &mut self,
+        there: Registered,
+        start_rad: f32,
+        radius_px: f32,
+        residual: Residual,
+    ) -> Option<Registered> {
+        self.grid.build(&self.first, REACH_RADII * radius_px);
         let back = one_way(&self.second, &self.first, &self.grid, -start_rad, radius_px, residual)?;
         Some(Registered {
             yaw_rad: 0.5 * (there.yaw_rad - back.yaw_rad),

@@ -90,15 +90,14 @@ impl PointToPoint {
     }
 }
 
-/// R = V U^T of a covariance U S V^T.
+/// R = V U^T of a covariance U S V^T: in the plane the two orthogonal factors of the singular value decomposition
+/// multiply to one turn, whose angle is in closed form. nalgebra's own decomposition gives the same (tested
+/// below), but takes sine and cosine in f64, which the device would have to emulate.
 fn rotation(covariance: Matrix2<f32>) -> Option<Matrix2<f32>> {
-    let svd = covariance.svd(true, true);
-    let (u, v_t) = (svd.u?, svd.v_t?);
-    let v = v_t.transpose();
-    // A reflection would be no rotation: turn the weaker axis around.
-    let flip = Matrix2::new(1.0, 0.0, 0.0, (v * u.transpose()).determinant().signum());
-    let rotation = v * flip * u.transpose();
-    rotation.iter().all(|value| value.is_finite()).then_some(rotation)
+    let sin = covariance.m12 - covariance.m21;
+    let cos = covariance.m11 + covariance.m22;
+    let determined = sin.is_finite() && cos.is_finite() && (sin != 0.0 || cos != 0.0);
+    determined.then(|| Rigid::yaw(atan2(sin, cos)).rotation)
 }
 
 /// Sums over matched points that give yaw and shift from the distance *along the motion* ("sliding", or
@@ -148,7 +147,7 @@ mod tests {
     #[test]
     fn a_turn_clockwise_on_the_screen_is_a_positive_yaw() {
         // From 3 o'clock to half past four on a screen with y down: down and left.
-        let (x, y) = Rigid::yaw(0.785_398).apply(10.0, 0.0);
+        let (x, y) = Rigid::yaw(core::f32::consts::FRAC_PI_4).apply(10.0, 0.0);
         assert!(y > 7.0 && x > 7.0 && x < 7.2);
         let mut sums = PointToPoint::default();
         for (px, py) in [(10.0, 0.0), (0.0, 7.0), (-4.0, 3.0)] {
@@ -158,6 +157,18 @@ mod tests {
         let (yaw_rad, shift_px) = sums.solve().unwrap_or_default();
         assert!((yaw_rad - 0.3).abs() < 1e-5);
         assert!((shift_px.0 - 1.0).abs() < 1e-4 && (shift_px.1 + 2.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn the_closed_form_is_the_singular_value_decomposition() {
+        for (yaw_rad, stretch) in [(0.3, 1.0), (-2.5, 0.2), (3.0, 5.0), (1.5, 0.1)] {
+            let turned = Rigid::yaw(yaw_rad).rotation;
+            let covariance = Matrix2::new(2.0, 0.3, 0.3, stretch) * turned.transpose();
+            let svd = covariance.svd(true, true);
+            let product = svd.v_t.zip(svd.u).map(|(v_t, u)| v_t.transpose() * u.transpose());
+            let ours = rotation(covariance);
+            assert!(product.zip(ours).is_some_and(|(a, b)| (a - b).norm() < 1e-5), "{yaw_rad}");
+        }
     }
 
     #[test]
@@ -173,5 +184,6 @@ mod tests {
     fn nothing_matched_gives_no_wild_answer() {
         assert!(PointToHelicoid::default().solve().is_some_and(|(yaw, _)| yaw == 0.0));
         assert_eq!(PointToPoint::default().solve(), None);
+        assert_eq!(PointToPoint::default().about_origin(), None);
     }
 }

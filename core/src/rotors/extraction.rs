@@ -16,7 +16,7 @@ use super::coherence::{Coherence, Phasor};
 use super::disc::{Disc, without_outliers};
 use super::heat::{CellGrid, Cells};
 use super::kmeans::{Cluster, KMeans, Seeding, davies_bouldin, nearest};
-use super::winding::{Winding, collect, explain};
+use super::winding::{Explainer, Winding};
 use crate::limits::{COHERENCE_CELLS, MAX_CANDIDATES, MAX_CLUSTERS, MAX_LINES};
 use crate::math::{TAU, sqrt};
 use crate::speed::polar::{PolarTrack, track};
@@ -87,7 +87,9 @@ enum Stage {
     Tiles,
     Spectrum,
     Map,
+    Whole,
     Split,
+    Part,
     Local,
     Done,
 }
@@ -105,7 +107,11 @@ pub struct Extraction {
     line: usize,
     /// Grid of the map at hand.
     grid: CellGrid,
+    /// Whether that is the map of one tile.
+    local: bool,
     k: usize,
+    /// Cluster at hand.
+    part: usize,
     /// Clustering with the lowest index so far.
     best_index: f32,
     best: Vec<Cluster, MAX_CLUSTERS>,
@@ -123,6 +129,8 @@ pub struct Scratch {
     pub map: [u16; COHERENCE_CELLS],
     /// Its weights.
     pub map_weights: [u8; COHERENCE_CELLS],
+    /// The search for a rotation that explains it.
+    pub explainer: Explainer,
 }
 
 impl Default for Scratch {
@@ -131,6 +139,7 @@ impl Default for Scratch {
             coherence: Coherence::default(),
             map: [0; COHERENCE_CELLS],
             map_weights: [0; COHERENCE_CELLS],
+            explainer: Explainer::default(),
         }
     }
 }
@@ -177,17 +186,15 @@ impl Extraction {
             }
             Stage::Spectrum => self.spectrum(view, track, scanner),
             Stage::Map => self.map(view, scratch),
+            Stage::Whole => self.whole(scratch),
             Stage::Split => self.split(scratch),
+            Stage::Part => self.part(scratch),
             Stage::Local => self.local(view, scratch),
             Stage::Done => {}
         }
         self.stage == Stage::Done
     }
 
-    #[doc(hidden)]
-    pub fn debug(&self) -> impl core::fmt::Debug + '_ {
-        &self.lines
-    }
     /// Name of the stage that the next step belongs to.
     #[must_use]
     pub const fn stage(&self) -> &'static str {
@@ -195,6 +202,7 @@ impl Extraction {
             Stage::Seed | Stage::Tiles => "tiles",
             Stage::Spectrum => "spectrum",
             Stage::Map => "map",
+            Stage::Whole | Stage::Part => "winding",
             Stage::Split => "split",
             Stage::Local => "local map",
             Stage::Done => "done",
@@ -315,57 +323,64 @@ impl Extraction {
         if self.stage == Stage::Local {
             return;
         }
-        self.stage = Stage::Local;
-        let Some(whole) = self.whole_map(view, line.line_hz, view.map_grid, scratch) else {
-            return;
-        };
-        if whole.is_some_and(|whole| whole.share >= SHARE_OF_ONE) {
-            return;
-        }
-        self.k = 2;
-        self.best.clear();
-        self.best_index = f32::MAX;
-        self.stage = Stage::Split;
+        self.local = false;
+        self.fill(view, line.line_hz, view.map_grid, scratch);
     }
 
-    /// Fills a map and enters the rotation that explains all of it, when there is one.
-    /// `None` when the map is all but empty.
-    fn whole_map(
-        &mut self,
-        view: &View<'_>,
-        line_hz: f32,
-        grid: CellGrid,
-        scratch: &mut Scratch,
-    ) -> Option<Option<Found>> {
+    /// Fills a map and starts to look for one rotation that explains all of it.
+    fn fill(&mut self, view: &View<'_>, line_hz: f32, grid: CellGrid, scratch: &mut Scratch) {
         self.grid = grid;
         scratch.coherence.fill(&view.window, grid, line_hz);
         let size = grid.len().min(COHERENCE_CELLS);
         scratch.coherence.heat(grid, &mut scratch.map[..size]);
         weigh(&scratch.map[..size], MAP_FLOOR, &mut scratch.map_weights[..size]);
-        let cells = Cells { grid, weights: &scratch.map_weights[..size], floor: 0 };
+        let cells = self.map_cells(scratch);
         let mut one = KMeans::seed(cells, 1, Seeding::FarthestMean);
         one.sweep(cells);
-        let all = without_outliers(cells, one.clusters(), 0)?;
-        let (region, total) = collect(scratch.coherence.phasors(grid), |p| inside(p, &all));
-        if region.len() < LEAST_PHASORS {
-            return None;
+        let all = without_outliers(cells, one.clusters(), 0).unwrap_or_default();
+        scratch.explainer.start(scratch.coherence.phasors(grid), |p| inside(p, &all), all);
+        self.stage = Stage::Whole;
+    }
+
+    fn map_cells<'a>(&self, scratch: &'a Scratch) -> Cells<'a> {
+        let size = self.grid.len().min(COHERENCE_CELLS);
+        Cells { grid: self.grid, weights: &scratch.map_weights[..size], floor: 0 }
+    }
+
+    fn line_hz(&self) -> f32 {
+        self.lines.get(self.line).map_or(0.0, |line| line.line_hz)
+    }
+
+    /// One step of the look for one rotation; k = 1 when it explains the whole map.
+    fn whole(&mut self, scratch: &mut Scratch) {
+        if !scratch.explainer.step() {
+            return;
         }
-        let winding = explain(&region, all);
-        if winding.windings == 0 && winding.share > SHARE_OF_ONE {
+        let line_hz = self.line_hz();
+        let (region, _, _, winding) = scratch.explainer.result();
+        let empty = region.len() < LEAST_PHASORS;
+        if winding.windings == 0 && winding.share > SHARE_OF_ONE && !empty {
             self.in_step_hz = self.in_step_hz.or(Some(line_hz));
         }
-        let whole = believe(&winding, (&region, total), &all, line_hz, grid);
+        let whole = believe(&scratch.explainer, line_hz, self.grid);
         if let Some(whole) = whole {
             self.enter(whole);
         }
-        Some(whole)
+        if self.local {
+            self.end_line();
+        } else if empty || whole.is_some_and(|whole| whole.share >= SHARE_OF_ONE) {
+            self.stage = Stage::Local;
+        } else {
+            self.k = 2;
+            self.best.clear();
+            self.best_index = f32::MAX;
+            self.stage = Stage::Split;
+        }
     }
 
-    /// Splits the map into k clusters; after the last k, takes those of the best index that turn.
-    fn split(&mut self, scratch: &Scratch) {
-        let grid = self.grid;
-        let weights = &scratch.map_weights[..grid.len().min(COHERENCE_CELLS)];
-        let cells = Cells { grid, weights, floor: 0 };
+    /// Splits the map into k clusters and keeps the clustering of the best index.
+    fn split(&mut self, scratch: &mut Scratch) {
+        let cells = self.map_cells(scratch);
         for seeding in [Seeding::FarthestMean, Seeding::FarthestNearest] {
             let mut kmeans = KMeans::seed(cells, self.k, seeding);
             while !kmeans.sweep(cells) {}
@@ -377,39 +392,59 @@ impl Extraction {
             }
         }
         self.k += 1;
-        if self.k <= MAX_CLUSTERS {
-            return;
+        if self.k > MAX_CLUSTERS {
+            self.part = 0;
+            self.start_part(scratch);
         }
-        let line_hz = self.lines.get(self.line).map_or(0.0, |line| line.line_hz);
-        for index in 0..self.best.len() {
-            let Some(part) = without_outliers(cells, &self.best, index) else { continue };
-            let best = &self.best;
-            let (region, total) = collect(scratch.coherence.phasors(grid), |p| {
-                inside(p, &part) && nearest(best, p.x_px, p.y_px).0 == index
-            });
-            let winding = explain(&region, part);
-            if let Some(one) = believe(&winding, (&region, total), &part, line_hz, grid) {
+    }
+
+    /// Starts to look for the rotation that explains the next cluster.
+    fn start_part(&mut self, scratch: &mut Scratch) {
+        self.stage = Stage::Local;
+        while self.part < self.best.len() {
+            let cells = self.map_cells(scratch);
+            if let Some(part) = without_outliers(cells, &self.best, self.part) {
+                let mine = |p: &Phasor| {
+                    inside(p, &part) && nearest(&self.best, p.x_px, p.y_px).0 == self.part
+                };
+                scratch.explainer.start(scratch.coherence.phasors(self.grid), mine, part);
+                self.stage = Stage::Part;
+                return;
+            }
+            self.part += 1;
+        }
+    }
+
+    /// One step of the look for the rotation of one cluster.
+    fn part(&mut self, scratch: &mut Scratch) {
+        if scratch.explainer.step() {
+            if let Some(one) = believe(&scratch.explainer, self.line_hz(), self.grid) {
                 self.enter(one);
             }
+            self.part += 1;
+            self.start_part(scratch);
         }
-        self.stage = Stage::Local;
     }
 
     /// Looks at the line's tile alone in finer cells, unless a rotor is known there: a small rotor of many blades
     /// turns its phase over less than a cell of the whole image.
     fn local(&mut self, view: &View<'_>, scratch: &mut Scratch) {
-        self.stage = Stage::Map;
         let line = self.lines.get(self.line).copied().unwrap_or_default();
-        self.line += 1;
         let Disc { x_px, y_px, radius_px } = line.tile;
-        if self.candidates.iter().any(|found| found.disc.overlaps(&line.tile)) {
-            return;
-        }
         let half_px = (LOCAL_SHARE * radius_px).max(LEAST_LOCAL_PX);
         let grid = CellGrid::around(x_px, y_px, half_px, COHERENCE_CELLS);
-        if grid.cell_log2 < view.map_grid.cell_log2 {
-            self.whole_map(view, line.line_hz, grid, scratch);
+        let known = self.candidates.iter().any(|found| found.disc.overlaps(&line.tile));
+        if known || grid.cell_log2 >= view.map_grid.cell_log2 {
+            self.end_line();
+        } else {
+            self.local = true;
+            self.fill(view, line.line_hz, grid, scratch);
         }
+    }
+
+    fn end_line(&mut self) {
+        self.line += 1;
+        self.stage = Stage::Map;
     }
 
     /// Enters a candidate; when the list is full, in place of the one that explains least.
@@ -431,20 +466,16 @@ fn inside(phasor: &Phasor, part: &Disc) -> bool {
 }
 
 /// A rotor, when the winding is one to be believed.
-fn believe(
-    winding: &Winding,
-    (region, total): (&[Phasor], usize),
-    part: &Disc,
-    line_hz: f32,
-    grid: CellGrid,
-) -> Option<Found> {
+fn believe(explainer: &Explainer, line_hz: f32, grid: CellGrid) -> Option<Found> {
+    let (region, total, part, winding) = explainer.result();
+    let Winding { share, share_in_step, windings, .. } = winding;
     let thinned = total as f32 / region.len().max(1) as f32;
     let axis = Disc { x_px: winding.x_px, y_px: winding.y_px, radius_px: 0.0 };
     let off_centre = MOST_OFF_CENTRE * part.radius_px;
-    let believed = winding.windings != 0
+    let believed = windings != 0
         && region.len() >= LEAST_PHASORS
-        && winding.share >= LEAST_SHARE
-        && winding.share - winding.share_in_step >= LEAST_LEAD
+        && share >= LEAST_SHARE
+        && share - share_in_step >= LEAST_LEAD
         && part.distance2(&axis) <= off_centre * off_centre;
     let radius_px = rim(region, &axis);
     let cell_px = grid.cell_px();
@@ -453,11 +484,11 @@ fn believe(
     let disc_px2 = core::f32::consts::PI * radius_px * radius_px;
     (believed && covered_px2 > LEAST_COVER * disc_px2).then(|| Found {
         disc: Disc { radius_px, ..axis },
-        omega_rad_s: line_hz * TAU / winding.windings as f32,
-        windings: winding.windings.unsigned_abs(),
+        omega_rad_s: line_hz * TAU / windings as f32,
+        windings: windings.unsigned_abs(),
         line_hz,
-        share: winding.share,
-        explained: winding.share * region.iter().map(|p| p.amplitude).sum::<f32>() * thinned,
+        share,
+        explained: share * region.iter().map(|p| p.amplitude).sum::<f32>() * thinned,
     })
 }
 

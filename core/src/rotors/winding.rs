@@ -19,7 +19,7 @@ const MOST_WINDINGS: usize = 16;
 /// Rings between centre and rim, each with a phase of its own (swept blades), for each polarity.
 const RINGS: usize = 4;
 const BANKS: usize = 2 * RINGS;
-/// First search: centres on a square of this many steps to each side.
+/// First search: this many steps to each side.
 const COARSE_STEPS: i32 = 3;
 /// Spacing of the first search, as a share of the radius.
 const COARSE_SPACING: f32 = 0.2;
@@ -27,7 +27,7 @@ const COARSE_SPACING: f32 = 0.2;
 const HALVINGS: u8 = 3;
 
 /// Phasors of one region, evenly thinned.
-pub type Region = Vec<Phasor, WINDING_PHASORS>;
+type Region = Vec<Phasor, WINDING_PHASORS>;
 
 /// A rotation that explains a region.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -45,7 +45,7 @@ pub struct Winding {
 }
 
 /// Collects the phasors for which `inside` holds, evenly thinned to the capacity; returns their number before that too.
-pub fn collect(
+fn collect(
     phasors: impl Iterator<Item = Phasor> + Clone,
     inside: impl Fn(&Phasor) -> bool,
 ) -> (Region, usize) {
@@ -61,30 +61,66 @@ pub fn collect(
     (region, total)
 }
 
-/// The axis and winding number that explain the region best, searched within 0.6 radius of the disc's centre.
-/// Cost: about 300 instructions a phasor and centre, 80 centres.
-#[must_use]
-pub fn explain(region: &[Phasor], disc: Disc) -> Winding {
-    let mut best = Winding::default();
-    let mut spacing_px = COARSE_SPACING * disc.radius_px;
-    let search = |from: (f32, f32), steps: i32, spacing_px: f32, best: &mut Winding| {
-        for row in -steps..=steps {
-            for column in -steps..=steps {
-                let (x_px, y_px) =
-                    (from.0 + column as f32 * spacing_px, from.1 + row as f32 * spacing_px);
-                let found = about(region, x_px, y_px, disc.radius_px);
-                if found.share > best.share {
-                    *best = found;
-                }
+/// The search for the axis and winding number that explain a region best, a row of centres a step.
+///
+/// Centres lie on a square of 0.6 radius to each side of the disc's centre, then on ever smaller ones around the best.
+#[derive(Debug, Default)]
+pub struct Explainer {
+    region: Region,
+    /// Phasors before thinning.
+    total: usize,
+    disc: Disc,
+    from: (f32, f32),
+    spacing_px: f32,
+    halvings: u8,
+    row: i32,
+    best: Winding,
+}
+
+impl Explainer {
+    /// Starts over with the phasors for which `inside` holds.
+    pub fn start(
+        &mut self,
+        phasors: impl Iterator<Item = Phasor> + Clone,
+        inside: impl Fn(&Phasor) -> bool,
+        disc: Disc,
+    ) {
+        (self.region, self.total) = collect(phasors, inside);
+        self.disc = disc;
+        self.from = (disc.x_px, disc.y_px);
+        self.spacing_px = COARSE_SPACING * disc.radius_px;
+        self.halvings = 0;
+        self.row = -COARSE_STEPS;
+        self.best = Winding::default();
+    }
+
+    /// Tries a row of centres; `true` once the best is found.
+    /// Cost: about 400 instructions a phasor and centre, 7 centres at most.
+    pub fn step(&mut self) -> bool {
+        let steps = if self.halvings == 0 { COARSE_STEPS } else { 1 };
+        for column in -steps..=steps {
+            let x_px = self.from.0 + column as f32 * self.spacing_px;
+            let y_px = self.from.1 + self.row as f32 * self.spacing_px;
+            let found = about(&self.region, x_px, y_px, self.disc.radius_px);
+            if found.share > self.best.share {
+                self.best = found;
             }
         }
-    };
-    search((disc.x_px, disc.y_px), COARSE_STEPS, spacing_px, &mut best);
-    for _ in 0..HALVINGS {
-        spacing_px *= 0.5;
-        search((best.x_px, best.y_px), 1, spacing_px, &mut best);
+        self.row += 1;
+        if self.row > steps {
+            self.halvings += 1;
+            self.spacing_px *= 0.5;
+            self.from = (self.best.x_px, self.best.y_px);
+            self.row = -1;
+        }
+        self.halvings > HALVINGS
     }
-    best
+
+    /// The phasors, their number before thinning, the disc they come from, and what explains them best.
+    #[must_use]
+    pub fn result(&self) -> (&[Phasor], usize, Disc, Winding) {
+        (&self.region, self.total, self.disc, self.best)
+    }
 }
 
 /// The winding number that explains the region best about a given axis.
@@ -125,10 +161,12 @@ fn about(region: &[Phasor], x_px: f32, y_px: f32, radius_px: f32) -> Winding {
     let possible: f32 = weights.iter().map(|(sum, sum2)| sqrt((sum * sum - sum2).max(0.0))).sum();
     let mut found = Winding { x_px, y_px, ..Winding::default() };
     for term in 0..TERMS {
-        let aligned: f32 = (0..BANKS)
-            .map(|bank| {
-                let (re, im) = sums[bank][term];
-                sqrt((re * re + im * im - weights[bank].1).max(0.0))
+        let aligned: f32 = sums
+            .iter()
+            .zip(&weights)
+            .map(|(bank, (_, squares))| {
+                let (re, im) = bank[term];
+                sqrt((re * re + im * im - squares).max(0.0))
             })
             .sum();
         let share = aligned / possible.max(1.0);
@@ -141,4 +179,55 @@ fn about(region: &[Phasor], x_px: f32, y_px: f32, radius_px: f32) -> Winding {
         }
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use super::*;
+
+    /// Phasors of a rotor about (100, 80), as cells of 8 px see it.
+    fn rotor(windings: i32, radius_px: f32) -> Vec<Phasor> {
+        let mut phasors = Vec::new();
+        for row in 0..30 {
+            for column in 0..30 {
+                let (x_px, y_px) = (column as f32 * 8.0, row as f32 * 8.0);
+                let (dx, dy) = (x_px - 100.0, y_px - 80.0);
+                if dx * dx + dy * dy < radius_px * radius_px {
+                    let phase = -windings as f32 * libm::atan2f(dy, dx) + 0.7;
+                    let (re, im) = (10.0 * libm::cosf(phase), 10.0 * libm::sinf(phase));
+                    phasors.push(Phasor { x_px, y_px, re, im, amplitude: 10.0, on: true });
+                }
+            }
+        }
+        phasors
+    }
+
+    fn explain(phasors: &[Phasor], disc: Disc) -> Winding {
+        let mut explainer = Explainer::default();
+        explainer.start(phasors.iter().copied(), |_| true, disc);
+        while !explainer.step() {}
+        explainer.result().3
+    }
+
+    #[test]
+    fn the_windings_tell_speed_sense_and_axis_from_an_off_centre_start() {
+        let start = Disc { x_px: 118.0, y_px: 70.0, radius_px: 60.0 };
+        for windings in [-5, -2, -1, 1, 3, 4, 8] {
+            let found = explain(&rotor(windings, 60.0), start);
+            assert_eq!(found.windings, windings);
+            assert!(found.share > 0.9, "{found:?}");
+            assert!(
+                (found.x_px - 100.0).abs() < 5.0 && (found.y_px - 80.0).abs() < 5.0,
+                "{found:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_lamp_winds_zero_times() {
+        let start = Disc { x_px: 100.0, y_px: 80.0, radius_px: 60.0 };
+        assert_eq!(explain(&rotor(0, 60.0), start).windings, 0);
+    }
 }

@@ -22,8 +22,8 @@ const MOST_EVENTS: usize = 160;
 const LEAST_EVENTS: usize = 24;
 /// Slices that a segment should hold.
 const SLICES: usize = 8;
-/// Most slices looked at.
-const MOST_SLICES: usize = 16;
+/// Most levels.
+const MOST_LEVELS: u8 = 16;
 /// A later slice is cut from this share of the events before it, so that the baseline grows geometrically.
 const GROWTH: f32 = 0.4;
 /// A level may change the rate by this factor at most, else the match jumped to another blade.
@@ -37,62 +37,100 @@ const MOST_BLUR_RAD: f32 = 0.5;
 /// Speed by each burst, in rad/s.
 pub type Rates = Vec<f32, WINDOW_SEGMENTS>;
 
-/// The rate that the ladder finds in one segment, in rad/s, positive = clockwise.
-#[must_use]
-pub fn ladder(
-    window: &Window<'_>,
+/// A ladder on one segment, one level a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Ladder {
     segment: usize,
     disc: Disc,
     residual: Residual,
-    icp: &mut Icp,
-) -> Option<f32> {
-    let annulus = Annulus::of(disc);
-    let events = window.segment(segment);
-    let placed = || {
-        events.iter().filter_map(|event| {
-            let (x_px, y_px, _) = annulus.place(*event)?;
-            let t_us = event.since(window.start_us);
-            Some((t_us, SlicePoint { x_px, y_px, tau_s: 0.0, on: event.is_on() }))
-        })
-    };
-    let size = (placed().count() / SLICES).min(MOST_EVENTS);
-    if size < LEAST_EVENTS {
-        return None;
+    /// Events in a slice.
+    size: usize,
+    /// Events that the slices so far were cut from.
+    passed: usize,
+    level: u8,
+    first_us: f32,
+    rate: Option<f32>,
+    /// Whether the rate rests on a motion large enough to judge the next by.
+    seen: bool,
+}
+
+impl Ladder {
+    /// A ladder at the bottom.
+    #[must_use]
+    pub const fn new(segment: usize, disc: Disc, residual: Residual) -> Self {
+        Self {
+            segment,
+            disc,
+            residual,
+            size: 0,
+            passed: 0,
+            level: 0,
+            first_us: 0.0,
+            rate: None,
+            seen: false,
+        }
     }
-    let mut rest = placed();
-    let (first_us, _) = take(&mut rest, size, size, &mut icp.first);
-    let mut passed = size;
-    let mut rate: Option<f32> = None;
-    // Whether the rate rests on a motion large enough to judge the next by.
-    let mut seen = false;
-    for _ in 0..MOST_SLICES {
-        let length = size.max((GROWTH * passed as f32) as usize);
-        let (second_us, length_us) = take(&mut rest, length, size, &mut icp.second);
-        passed += length;
-        let baseline_s = (second_us - first_us) * 1e-6;
-        let rate_so_far = if seen { rate.unwrap_or(0.0).abs() } else { 0.0 };
-        if icp.second.len() < size / 2
+
+    /// The rate so far in rad/s, positive = clockwise.
+    #[must_use]
+    pub const fn rate_rad_s(&self) -> Option<f32> {
+        self.rate
+    }
+
+    /// The rotor's events of the segment, placed.
+    fn placed<'a>(&self, window: &Window<'a>) -> impl Iterator<Item = (i32, SlicePoint)> + use<'a> {
+        let annulus = Annulus::of(self.disc);
+        let start_us = window.start_us;
+        window.segment(self.segment).iter().filter_map(move |event| {
+            let (x_px, y_px, _) = annulus.place(*event)?;
+            let point = SlicePoint { x_px, y_px, tau_s: 0.0, on: event.is_on() };
+            Some((event.since(start_us), point))
+        })
+    }
+
+    /// Climbs one level; `true` at the top. Cost: up to two million instructions.
+    pub fn step(&mut self, window: &Window<'_>, icp: &mut Icp) -> bool {
+        if self.level == 0 {
+            self.size = (self.placed(window).count() / SLICES).min(MOST_EVENTS);
+            if self.size < LEAST_EVENTS {
+                return true;
+            }
+            let mut events = self.placed(window);
+            (self.first_us, _) = take(&mut events, self.size, self.size, &mut icp.first);
+            self.passed = self.size;
+        }
+        self.level += 1;
+        self.climb(window, icp).is_none() || self.level >= MOST_LEVELS
+    }
+
+    /// Registers the first slice to the next later one; `None` when the ladder ends.
+    fn climb(&mut self, window: &Window<'_>, icp: &mut Icp) -> Option<()> {
+        let length = self.size.max((GROWTH * self.passed as f32) as usize);
+        let mut events = self.placed(window).skip(self.passed);
+        let (second_us, length_us) = take(&mut events, length, self.size, &mut icp.second);
+        self.passed += length;
+        let baseline_s = (second_us - self.first_us) * 1e-6;
+        let rate_so_far = if self.seen { self.rate.unwrap_or(0.0).abs() } else { 0.0 };
+        if icp.second.len() < self.size / 2
             || baseline_s <= 0.0
             || rate_so_far * baseline_s > MOST_TURN_RAD
             || rate_so_far * length_us * 1e-6 > MOST_BLUR_RAD
         {
-            break;
+            return None;
         }
-        let start_rad = rate.map_or(0.0, |rate| rate * baseline_s);
-        let Some(registered) = icp.both_ways(start_rad, disc.radius_px, residual) else {
-            break;
-        };
+        let start_rad = self.rate.map_or(0.0, |rate| rate * baseline_s);
+        let registered = icp.both_ways(start_rad, self.disc.radius_px, self.residual)?;
         let next = registered.yaw_rad / baseline_s;
-        if let Some(before) = rate
-            && seen
-            && (next - before).abs() > MOST_CHANGE * before.abs().max(next.abs())
-        {
-            break;
+        let jumped = |before: f32| {
+            self.seen && (next - before).abs() > MOST_CHANGE * before.abs().max(next.abs())
+        };
+        if self.rate.is_some_and(jumped) {
+            return None;
         }
-        seen = registered.yaw_rad.abs() * disc.radius_px > SEEN_PX;
-        rate = Some(next);
+        self.seen = registered.yaw_rad.abs() * self.disc.radius_px > SEEN_PX;
+        self.rate = Some(next);
+        Some(())
     }
-    rate
 }
 
 /// Moves the next `length` events, thinned to about `most`, into a slice; their mean time and their span in us.

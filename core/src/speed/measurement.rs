@@ -1,7 +1,7 @@
 //! The measurement of one rotor in one window, step by step: the paper's stages and the lock beyond them.
 
 use super::baseline::{Estimate, Pace, Pairs};
-use super::initial::{Rates, ladder, median};
+use super::initial::{Ladder, Rates, median};
 use super::phase::{Pattern, harmonics, newton, slope};
 use super::polar::{PolarTrack, track};
 use super::statistics::mean_and_error;
@@ -123,6 +123,9 @@ pub struct Measurement {
     events: usize,
     parts: Option<u8>,
     alike: bool,
+    ladder: Option<Ladder>,
+    /// Whether the ladder at hand leaves the axis free.
+    free_axis: bool,
     rates: Rates,
     free_rates: Rates,
     pairs: Option<Pairs>,
@@ -151,6 +154,8 @@ impl Measurement {
             events: 0,
             parts: None,
             alike: true,
+            ladder: None,
+            free_axis: false,
             rates: Rates::new(),
             free_rates: Rates::new(),
             pairs: None,
@@ -341,8 +346,9 @@ impl Measurement {
         let found = newton(polar, self.disc, self.omega_rad_s, self.harmonic, window.duration_us);
         let Some(step) = found else { return false };
         let reach_px = 0.3 * self.disc.radius_px;
-        self.disc.x_px += step.dx_px.clamp(-reach_px, reach_px);
-        self.disc.y_px += step.dy_px.clamp(-reach_px, reach_px);
+        // Not `clamp`, whose panic on a wrong order of bounds pulls float formatting into the image.
+        self.disc.x_px += step.dx_px.max(-reach_px).min(reach_px);
+        self.disc.y_px += step.dy_px.max(-reach_px).min(reach_px);
         self.omega_rad_s += step.domega_rad_s;
         self.events = track(window, self.disc, polar);
         true
@@ -350,17 +356,21 @@ impl Measurement {
 
     /// Initial alignment in every other segment: second coarse witness.
     fn initial(&mut self, window: &Window<'_>, icp: &mut Icp) {
+        if let Some(ladder) = &mut self.ladder {
+            if ladder.step(window, icp) {
+                let rates = if self.free_axis { &mut self.free_rates } else { &mut self.rates };
+                rates.extend(ladder.rate_rad_s());
+                self.ladder = None;
+                self.turn += u8::from(self.free_axis);
+                self.free_axis = !self.free_axis;
+            }
+            return;
+        }
         let segments = window.segments().min(WINDOW_SEGMENTS);
         let segment = usize::from(self.turn) * segments.div_ceil(LADDERS).max(1);
         if segment < segments {
-            let mut climb = |residual| ladder(window, segment, self.disc, residual, icp);
-            if let Some(rate) = climb(Residual::FixedAxis) {
-                self.rates.push(rate).ok();
-            }
-            if let Some(rate) = climb(Residual::FreeAxis) {
-                self.free_rates.push(rate).ok();
-            }
-            self.turn += 1;
+            let residual = if self.free_axis { Residual::FreeAxis } else { Residual::FixedAxis };
+            self.ladder = Some(Ladder::new(segment, self.disc, residual));
             return;
         }
         let Some(initial) = median(&mut self.rates) else {

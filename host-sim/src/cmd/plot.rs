@@ -7,15 +7,15 @@ use anyhow::{Context, bail};
 use evtach_core::{Event, Geometry, GyroSample, Settings};
 use evtach_host::measure::{Capacity, FileFacts, measure_events, summarise};
 use evtach_host::recording::{self, ImuSample, OpenOptions};
-use evtach_host::report::{Subject, html};
+use evtach_host::report::{Subject, heat_map, html};
 
 /// Arguments of `evtach plot`.
 #[derive(clap::Args)]
 pub struct Args {
     /// Recording; "-" reads stdin.
     file: PathBuf,
-    /// Report to write [default: the recording's name with .html].
-    #[arg(short, long, value_name = "HTML")]
+    /// Report to write [default: the recording's name with .html]; a name in .svg gets the heat map alone.
+    #[arg(short, long, value_name = "HTML|SVG")]
     out: Option<PathBuf>,
     /// Blade count, when it is known.
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=64))]
@@ -71,7 +71,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     settings.window_us = args.window_ms.map(|ms| ms * 1000);
     settings.clock_sigma_ppm = CLOCK_SIGMA_PPM;
     let (readings, _) = measure_events(&events, &gyro, settings, args.capacity);
-    let summary = summarise(&readings, first_us + (last_us - first_us) / 2, CLOCK_SIGMA_PPM);
+    let summary = summarise(&readings, first_us + last_us.saturating_sub(first_us) / 2, CLOCK_SIGMA_PPM);
     let facts = FileFacts {
         file: name,
         format: recording.format.to_owned(),
@@ -90,7 +90,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         summary: &summary,
         assumed: &recording.assumed,
     };
-    std::fs::write(&out, html(&subject)?)
+    let alone = out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg"));
+    let drawn = if alone { heat_map(&subject)? } else { html(&subject)? };
+    std::fs::write(&out, drawn)
         .with_context(|| format!("{}: cannot be written; choose --out", out.display()))?;
     println!("{}", out.display());
     let spoken = summary.rotors.iter().any(|rotor| rotor.speed.is_some());

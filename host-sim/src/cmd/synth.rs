@@ -191,3 +191,16 @@ fn scene(args: &Args) -> anyhow::Result<Scene> {
     scene.check()?;
     Ok(scene)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_truth_lies_beside_the_recording() {
+        let truth = |out: &str| truth_path(Path::new(out));
+        assert_eq!(truth("a/fan.evt2.raw"), Some(PathBuf::from("a/fan.truth.json")));
+        assert_eq!(truth("fan.v2.aedat4"), Some(PathBuf::from("fan.v2.truth.json")));
+        assert_eq!(truth("-"), None);
+    }
+}

@@ -98,6 +98,14 @@ pub fn html(subject: &Subject<'_>) -> Result<String, ReportError> {
     ))
 }
 
+/// Draws the heat map with its rotors alone, as one SVG document.
+///
+/// # Errors
+/// When the drawing fails.
+pub fn heat_map(subject: &Subject<'_>) -> Result<String, ReportError> {
+    heat::draw(subject)
+}
+
 const STYLE: &str = "body{font:16px/1.5 sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}\
     pre{background:#f6f6f6;padding:1rem;overflow-x:auto;font-size:13px}svg{max-width:100%;height:auto}";
 

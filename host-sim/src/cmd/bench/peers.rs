@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use serde_json::{Map, Value};
 
 use super::Common;
-use super::drive::{Capacity, readings};
+use super::drive::{Capacity, overall, readings};
 use super::report::{Report, Table, progress, short};
 use super::score::score;
 use super::spec;
@@ -124,7 +124,7 @@ fn scene(condition: &str, rpm: f64, seed: u64) -> Scene {
     scene
 }
 
-/// Error in ppm of the mean of a recording's readings at either capacity; NaN: no reading, or another rotor's.
+/// Error in ppm of the reading over a recording at either capacity; NaN: no reading, or far off.
 fn measure(condition: &str, rpm: f64, seed: u64) -> anyhow::Result<[f64; 2]> {
     let scene = scene(condition, rpm, seed);
     let made = generate(&scene)?;
@@ -133,17 +133,13 @@ fn measure(condition: &str, rpm: f64, seed: u64) -> anyhow::Result<[f64; 2]> {
         anyhow::bail!("the scene's sensor is larger than the tachometer's");
     };
     Ok(Capacity::ALL.map(|capacity| {
-        let series = readings(&made.events, &[], Settings::new(geometry), capacity);
-        // As for files longer than the window: the mean of the locked readings.
-        let locked: Vec<f64> = series
-            .iter()
-            .flat_map(|reading| score(&scene, &motion, reading).rotors)
-            .flatten()
-            .filter(|s| s.locked)
-            .filter_map(|s| s.camera)
-            .collect();
-        let mean = locked.iter().sum::<f64>() / locked.len() as f64;
-        let ppm = mean.abs() * 1e6;
+        let settings = Settings::new(geometry);
+        let series = readings(&made.events, &[], settings, capacity);
+        let end_us = (scene.duration_s() * 1e6) as u64;
+        let reading = overall(&series, end_us, settings.clock_sigma_ppm);
+        let scores = reading.map(|r| score(&scene, &motion, &r)).unwrap_or_default();
+        let error = scores.rotors.first().and_then(|s| s.as_ref()?.camera).unwrap_or(f64::NAN);
+        let ppm = error.abs() * 1e6;
         if ppm > FAIL_PPM { f64::NAN } else { ppm }
     }))
 }
