@@ -71,7 +71,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     settings.window_us = args.window_ms.map(|ms| ms * 1000);
     settings.clock_sigma_ppm = CLOCK_SIGMA_PPM;
     let (readings, _) = measure_events(&events, &gyro, settings, args.capacity);
-    let summary = summarise(&readings, first_us + last_us.saturating_sub(first_us) / 2, CLOCK_SIGMA_PPM);
+    let summary =
+        summarise(&readings, first_us + last_us.saturating_sub(first_us) / 2, CLOCK_SIGMA_PPM);
     let facts = FileFacts {
         file: name,
         format: recording.format.to_owned(),

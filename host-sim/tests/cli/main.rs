@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod contract;
+mod convert;
 mod demo;
 
 use std::path::{Path, PathBuf};
