@@ -103,7 +103,7 @@ impl Report {
             rotor.status.as_str(),
             if near { "yes" } else { "NO" },
         ]);
-        if !(error.abs() <= largest_error) {
+        if error.is_nan() || error.abs() > largest_error {
             self.fail(file, capacity, &format!("{rpm:+.2} rpm instead of {told}"));
         }
         if rotor.blades != Some(truth.blades) {

@@ -47,7 +47,7 @@ fn wrong(name: &str, scene: &Scene) -> Vec<String> {
             error * 1e6,
             rotor.status.as_str(),
         ));
-        if !(error.abs() <= LARGEST_ERROR) {
+        if error.is_nan() || error.abs() > LARGEST_ERROR {
             wrong.push(format!("{name}: {expected:+.1} rpm read as {rpm:+.1}"));
         }
         if rotor.blades != Some(truth.blades) {
@@ -177,7 +177,7 @@ fn arms(turn: Turn, rpm: f64) -> Loaded {
 fn growing_angle_is_clockwise() {
     for (turn, direction) in [(Turn::Growing, Direction::Cw), (Turn::Shrinking, Direction::Ccw)] {
         let (_, summary) = measure(&arms(turn, 1234.0), Capacity::Device);
-        let [rotor] = &summary.rotors[..] else { panic!("one rotor: {summary:?}") };
+        let [rotor] = &summary.rotors[..] else { unreachable!("one rotor: {summary:?}") };
         let speed = rotor.speed.expect("a speed");
         assert_eq!(speed.direction(), direction);
         assert!((f64::from(speed.rpm()) / 1234.0 - 1.0).abs() < LARGEST_ERROR, "{speed:?}");

@@ -125,7 +125,7 @@ fn drain(tachometer: &mut Tachometer<'_>, readings: &mut Vec<Reading>) {
             Poll::Ready(reading) => readings.push(reading),
         }
     }
-    panic!("the tachometer never comes to rest");
+    unreachable!("the tachometer never comes to rest");
 }
 
 fn check(reading: &Reading) {

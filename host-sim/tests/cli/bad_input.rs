@@ -79,7 +79,7 @@ fn truncated_file() {
         let path = write(&folder, name, &rotor());
         let bytes = std::fs::read(&path).expect("the file just written");
         // An odd number, so that a word is cut in two.
-        std::fs::write(&path, &bytes[..bytes.len() * 9 / 10 | 1]).expect("room on the disk");
+        std::fs::write(&path, &bytes[..(bytes.len() * 9 / 10) | 1]).expect("room on the disk");
         let run = measure(&path);
         assert_eq!(run.code, Some(0), "{name}: {}", run.stderr);
         assert_reads_the_rotor(&run.stdout);
