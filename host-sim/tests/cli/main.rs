@@ -4,6 +4,7 @@
 
 mod bad_input;
 mod contract;
+mod convert;
 mod demo;
 
 use std::path::{Path, PathBuf};

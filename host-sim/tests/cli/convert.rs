@@ -1,0 +1,108 @@
+//! `evtach convert` and `evtach info`.
+
+use super::*;
+
+const SIDES: Geometry = Geometry { width_px: 200, height_px: 160 };
+
+/// Events of a rotor with times that EVT 3 cannot hold as they are.
+fn late() -> Vec<Event> {
+    let base_us = 1_700_000_000_000_000;
+    rotor().into_iter().map(|event| Event { t_us: event.t_us + base_us, ..event }).collect()
+}
+
+fn file(folder: &TempDir, name: &str, format: WriteFormat, events: &[Event]) -> String {
+    let path = folder.path().join(name);
+    let mut writer = create(&path, format, SIDES).expect("a file");
+    writer.write(events).expect("events that fit");
+    writer.finish().expect("room on the disk");
+    path.display().to_string()
+}
+
+/// Events as CSV lines.
+fn lines(events: impl IntoIterator<Item = Event>) -> String {
+    let rows =
+        events.into_iter().map(|e| format!("{},{},{},{}\n", e.t_us, e.x, e.y, e.polarity as u8));
+    format!("t,x,y,p\n{}", rows.collect::<String>())
+}
+
+#[test]
+fn through_every_format_and_back() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let events = rotor();
+    let mut from = file(&folder, "in.csv", WriteFormat::Csv, &events);
+    for name in ["a.evt2.raw", "a.evt3.raw", "a.dat", "a.aedat4", "a.npy", "a.es"] {
+        let to = folder.path().join(name).display().to_string();
+        let run = evtach(&["convert", "--geometry", "200x160", &from, &to], b"");
+        assert_eq!(run.code, Some(0), "{name}: {}", run.stderr);
+        from = to;
+    }
+    let run = evtach(&["convert", &from, "-", "--to", "csv"], b"");
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert!(run.stdout == lines(events), "{}", run.stderr);
+}
+
+#[test]
+fn pipes_and_times_the_format_cannot_hold() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let events = late();
+    let from = file(&folder, "in.aedat4", WriteFormat::Aedat4, &events);
+    let to = folder.path().join("out.raw").display().to_string();
+    let run = evtach(&["convert", &from, &to], b"");
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert!(run.stderr.contains("time begins at zero"), "{}", run.stderr);
+    let bytes = std::fs::read(&to).expect("what was written");
+    let run = evtach(&["convert", "-", "-", "--to", "csv"], &bytes);
+    let first_us = events[0].t_us;
+    let expected = events.iter().map(|event| Event { t_us: event.t_us - first_us, ..*event });
+    assert!(run.stdout == lines(expected), "{}", run.stderr);
+}
+
+#[test]
+fn a_part_of_a_recording() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let events = rotor();
+    let from = file(&folder, "in.dat", WriteFormat::Dat, &events);
+    let part = ["--roi", "90,70,20,30", "--start", "0.02", "--end", "0.05", "--decimate", "3"];
+    let run = evtach(&[&["convert", &from, "-", "--to", "csv"][..], &part].concat(), b"");
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let first_us = events[0].t_us;
+    let inside = |event: &Event| {
+        (90..110).contains(&event.x)
+            && (70..100).contains(&event.y)
+            && (20_000..=50_000).contains(&(event.t_us - first_us))
+    };
+    let expected: Vec<Event> =
+        events.iter().filter(|event| inside(event)).step_by(3).copied().collect();
+    assert!(expected.len() > 20);
+    assert!(run.stdout == lines(expected), "{}", run.stderr);
+}
+
+#[test]
+fn bad_use_is_told() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let from = file(&folder, "in.csv", WriteFormat::Csv, &rotor());
+    let other = folder.path().join("out.xyz").display().to_string();
+    assert_refused_as_bad(&evtach(&["convert", &from, &from], b""), "the same file");
+    assert_refused_as_bad(&evtach(&["convert", &from, &other], b""), "--to");
+    assert_refused_as_bad(&evtach(&["convert", &from, "-", "--to", "npy"], b""), "unknown length");
+}
+
+#[test]
+fn info_tells_what_a_recording_holds() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let events = rotor();
+    let from = file(&folder, "in.evt3.raw", WriteFormat::Evt3, &events);
+    let run = evtach(&["info", &from], b"");
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let count = format!("events          {} (100.0 %)", events.len());
+    for told in [
+        "format          EVT3",
+        "sensor          200x160",
+        &count,
+        "out of order    0",
+        "gaps ",
+        "periodic ",
+    ] {
+        assert!(run.stdout.contains(told), "{told:?} is not in: {}", run.stdout);
+    }
+}
