@@ -1,6 +1,7 @@
 //! No stream of events, however mad, makes the tachometer panic, hang, or give a speed that is no number.
 //!
 //! The test profile checks overflow of integers.
+#![allow(clippy::panic)] // A test fails by it.
 
 use evtach_core::{
     Event, Geometry, GyroSample, Memory, Polarity, Poll, Reading, Roi, Settings, StoredEvent,
