@@ -167,7 +167,7 @@ fn play(settings: Settings, inputs: &[Input], store_events: usize, heat_cells: u
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        cases: 200,
+        cases: 2_000,
         max_shrink_iters: 200,
         failure_persistence: None,
         ..ProptestConfig::default()
