@@ -1,4 +1,5 @@
 //! Synthetic recordings with known truth, small enough to run everywhere.
+#![allow(clippy::panic)] // A test fails by it.
 
 use evtach_core::{Direction, Event, Geometry, Polarity, Reason, Status};
 use evtach_host::measure::{Capacity, Summary};

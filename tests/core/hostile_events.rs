@@ -1,6 +1,7 @@
 //! No stream of events, however mad, makes the tachometer panic, hang, or give a speed that is no number.
 //!
 //! The test profile checks overflow of integers.
+#![allow(clippy::panic)] // A test fails by it.
 
 use evtach_core::{
     Event, Geometry, GyroSample, Memory, Polarity, Poll, Reading, Roi, Settings, StoredEvent,
@@ -166,7 +167,7 @@ fn play(settings: Settings, inputs: &[Input], store_events: usize, heat_cells: u
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        cases: 200,
+        cases: 2_000,
         max_shrink_iters: 200,
         failure_persistence: None,
         ..ProptestConfig::default()

@@ -3,6 +3,7 @@
 //! Each property is tried on several rotors. Where pixels fall into the cells of a grid decides which of the events are
 //! registered with each other: two readings of the same events may differ as two measurements do, by the square root of
 //! two of their error bar on average.
+#![allow(clippy::panic)] // A test fails by it.
 
 use evtach_core::{Direction, Event, Geometry, Polarity, Poll, RotorReading, Settings, Speed};
 use evtach_host::measure::{Capacity, drain, measure_events, summarise, with_tachometer};

@@ -1,5 +1,4 @@
 //! The program as its users meet it: exit codes, streams, and the JSON contract.
-
 #![allow(clippy::panic, reason = "a test fails by panicking")]
 
 mod bad_input;
