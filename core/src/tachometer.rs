@@ -52,7 +52,7 @@ const MOST_MEASURED: usize = 12;
 const CLOCK_RESET_US: u64 = 1_000_000;
 /// Latest sensor time that is believed: beyond it (292 000 years) sums of times could overflow.
 const LATEST_US: u64 = u64::MAX / 2;
-/// Standard deviation of a gyro's zero-rate offset in rad/s, calibrated on a still camera.
+/// Standard deviation of a gyro's zero-rate offset in rad/s, with the offset calibrated on a still camera.
 const GYRO_OFFSET_RAD_S: f32 = 3e-3;
 
 /// A rectangle of pixels; events outside are ignored.
@@ -561,12 +561,16 @@ const fn segment_us(window_us: u32) -> u32 {
 
 fn rotor_reading(id: u8, outcome: &Outcome, roll_rad_s: Option<f32>) -> RotorReading {
     let mut speed = outcome.speed;
-    if let (Some(speed), Some(roll_rad_s)) = (&mut speed, roll_rad_s) {
+    if let Some(speed) = &mut speed {
+        // The gyro serves where its offset is smaller than what the hand may have rolled.
+        let mut roll_sigma = outcome.roll_sigma_rad_s;
+        if let Some(roll_rad_s) = roll_rad_s.filter(|_| GYRO_OFFSET_RAD_S < roll_sigma) {
+            speed.omega_rad_s -= roll_rad_s;
+            speed.frame = Frame::Room;
+            roll_sigma = GYRO_OFFSET_RAD_S;
+        }
         let sigma = speed.omega_sigma_rad_s;
-        speed.omega_rad_s -= roll_rad_s;
-        speed.omega_sigma_rad_s =
-            crate::math::sqrt(sigma * sigma + GYRO_OFFSET_RAD_S * GYRO_OFFSET_RAD_S);
-        speed.frame = Frame::Room;
+        speed.omega_sigma_rad_s = crate::math::sqrt(sigma * sigma + roll_sigma * roll_sigma);
     }
     let Disc { x_px, y_px, radius_px } = outcome.found.disc;
     let evidence: Evidence = outcome.evidence;

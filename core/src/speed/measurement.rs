@@ -133,6 +133,7 @@ pub struct Measurement {
     status: Status,
     alpha_rad_s2: Option<f32>,
     drift_px_s: f32,
+    roll_sigma_rad_s: f32,
     /// Window in microseconds that would do for a lock.
     wanted_us: f32,
     evidence: Evidence,
@@ -163,6 +164,7 @@ impl Measurement {
             status: Status::Refused(Reason::Searching),
             alpha_rad_s2: None,
             drift_px_s: 0.0,
+            roll_sigma_rad_s: 0.0,
             wanted_us: 0.0,
             evidence: Evidence::default(),
         }
@@ -547,7 +549,8 @@ impl Measurement {
             0.0
         };
         let own = self.estimate.sigma_rad_s;
-        self.estimate.sigma_rad_s = sqrt(own * own + clock * clock + roll * roll);
+        self.estimate.sigma_rad_s = sqrt(own * own + clock * clock);
+        self.roll_sigma_rad_s = roll;
     }
 
     /// Whether a reading without a lock may stand: it has no long baseline to contradict it, so the phase must advance
@@ -583,6 +586,7 @@ impl Measurement {
             parts: self.parts,
             alike: self.alike,
             speed,
+            roll_sigma_rad_s: self.roll_sigma_rad_s,
             evidence: self.evidence,
             wanted_us: self.wanted_us,
         }
@@ -600,8 +604,10 @@ pub struct Outcome {
     pub parts: Option<u8>,
     /// Whether the parts are alike.
     pub alike: bool,
-    /// Speed, unless refused.
+    /// Speed relative to the camera, unless refused; camera roll is not in its error.
     pub speed: Option<Speed>,
+    /// Standard deviation of the camera's mean roll rate in rad/s, from how the centre wanders.
+    pub roll_sigma_rad_s: f32,
     /// What each stage found.
     pub evidence: Evidence,
     /// Window in microseconds that a lock needs, 0 when the speed is not known.

@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, bail};
-use evtach_core::{Event, Geometry, Reading, Roi, Settings};
+use evtach_core::{Event, Geometry, GyroSample, Reading, Roi, Settings};
 use evtach_host::measure::{
     Capacity, Document, FileFacts, drain, evidence, feed, summarise, table, with_tachometer,
 };
-use evtach_host::recording::{self, OpenOptions};
+use evtach_host::recording::{self, ImuSample, OpenOptions};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Arguments of `evtach measure`.
@@ -46,6 +46,12 @@ pub struct Args {
     /// One standard deviation of the camera clock's error.
     #[arg(long, value_name = "PPM", default_value_t = 15.0)]
     clock_ppm: f32,
+    /// Take the camera's own roll out of the speed by the recording's gyro, where it has one.
+    ///
+    /// The gyro's offset should have been calibrated away; its axes are those of the cameras' documentation, not yet
+    /// checked against a recording of a rolling camera.
+    #[arg(long)]
+    gyro: bool,
     /// Show what each stage found, and why something was refused.
     #[arg(short, long)]
     verbose: bool,
@@ -106,6 +112,7 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
     let mut failure = None;
     let ignored = with_tachometer(settings, args.capacity, |tachometer| {
         let mut chunk: Vec<Event> = Vec::new();
+        let mut rolls: Vec<GyroSample> = Vec::new();
         let mut origin_us = None;
         let (mut known_lost, mut measured) = (0, None::<(u64, u64)>);
         loop {
@@ -129,7 +136,14 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
                 let start_us = measured.map_or(first.t_us, |(start_us, _)| start_us);
                 measured = Some((start_us, last.t_us));
             }
-            feed(tachometer, &chunk, &mut &[][..], |reading| readings.push(reading));
+            let samples = recording.take_imu();
+            if args.gyro {
+                rolls.extend(samples.iter().map(ImuSample::roll));
+            }
+            let mut ahead = &rolls[..];
+            feed(tachometer, &chunk, &mut ahead, |reading| readings.push(reading));
+            let used = rolls.len() - ahead.len();
+            rolls.drain(..used);
             if !more {
                 break;
             }
