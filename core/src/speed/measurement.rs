@@ -1,12 +1,14 @@
 //! The measurement of one rotor in one window, step by step: the paper's stages and the lock beyond them.
 
+mod verdict;
+
 use super::baseline::{Estimate, Pace, Pairs};
 use super::initial::{Ladder, Rates, median};
 use super::phase::{Pattern, harmonics, newton, slope};
 use super::polar::{PolarTrack, track};
 use super::statistics::mean_and_error;
 use super::symmetry::symmetry;
-use crate::math::{TAU, sqrt};
+use crate::math::TAU;
 use crate::reading::{Evidence, Frame, Reason, Speed, Status};
 use crate::registration::{Icp, Residual};
 use crate::rotors::{Disc, Found};
@@ -22,10 +24,11 @@ const FOLLOWING_SIGMA: f32 = 1e-3;
 const LEAST_COHERENCE: f32 = 0.3;
 /// Share in step of the second best harmonic over that of the best: beyond this the pattern stands, or the centre is off.
 const MOST_STANDING: f32 = 0.8;
-/// Two coarse speeds that differ by more than this contradict each other: the speeds that a line could also mean are
-/// a sixteenth apart at worst, but half for a single mark, whose registration has less to go by.
+/// Two coarse speeds contradict each other when they differ by more than half the way to the next speed that the line
+/// could also mean (its frequency over one winding more), but within these shares: registration of thin
+/// slices falls short of the turn by up to a tenth.
 const COARSE_AGREEMENT: f32 = 0.15;
-const COARSE_AGREEMENT_OF_ONE: f32 = 0.25;
+const MOST_COARSE_AGREEMENT: f32 = 0.25;
 /// Multiples of the blade count that are looked at for the phase, the highest harmonic, the least share in step,
 /// and the steps of the centre.
 const MOST_MULTIPLE: u32 = 4;
@@ -58,28 +61,11 @@ const REFINEMENT_PERIODS: f32 = 0.4;
 const LOCK_SHARE: f32 = 2.0 / 3.0;
 /// A step to m periods is safe while three standard errors stay below this share of a period.
 const SAFE_SLIP: f32 = 0.33;
-/// Farthest deviation of the fractional-baseline test, as a share of the angle of symmetry.
-const MOST_DEVIATION: f32 = 0.03;
-/// Witnesses of the lock may differ by this much, or by eight standard errors.
-const LOCK_AGREEMENT: f32 = 2e-3;
-const LOCK_SIGMAS: f32 = 8.0;
-/// A lock with a larger relative error is only coarse.
-const MOST_LOCK_SIGMA: f32 = 3e-3;
-/// A coarse reading's phase must give its speed and be straight within these shares, and the initial alignment of
-/// every segment must give it within the last.
-const COARSE_PHASE: f32 = 0.05;
-const COARSE_PHASE_SIGMA: f32 = 0.03;
-const COARSE_SPREAD: f32 = 0.5;
 /// Error of a coarse reading, relative, for one symmetry period in the window.
 const COARSE_SIGMA: f32 = 0.01;
 /// Fastest shaft, and fastest passing of blades, in revolutions a minute.
 const MOST_RPM: f32 = 60_000.0;
 const MOST_BLADE_RPM: f32 = 150_000.0;
-/// Roll of a hand-held camera for each pixel of shift: tremor turns the camera by about one milliradian as
-/// it shifts the image by one pixel.
-const ROLL_RAD_PER_PX: f32 = 1e-3;
-/// Slower wandering of the centre than this in px/s is the measurement's own noise.
-const STILL_PX_S: f32 = 6.0;
 
 /// What the person stated.
 #[derive(Clone, Copy, Debug)]
@@ -118,8 +104,11 @@ pub struct Measurement {
     second_look: bool,
     disc: Disc,
     omega_rad_s: f32,
+    /// Angular harmonic whose phase is followed.
     harmonic: u32,
+    /// Frequency and angular harmonic of the line that the rotor was found by.
     line_hz: f32,
+    windings: u32,
     events: usize,
     parts: Option<u8>,
     alike: bool,
@@ -152,6 +141,7 @@ impl Measurement {
             omega_rad_s: found.omega_rad_s,
             harmonic: found.windings,
             line_hz: found.line_hz,
+            windings: found.windings,
             events: 0,
             parts: None,
             alike: true,
@@ -301,6 +291,7 @@ impl Measurement {
         if standing > MOST_STANDING {
             return self.refuse(Reason::Ambiguous);
         }
+        self.windings = self.harmonic;
         self.turn = 0;
         self.stage = Stage::Symmetry;
     }
@@ -379,8 +370,10 @@ impl Measurement {
             return self.refuse(Reason::TooFewEvents);
         };
         self.evidence.initial_rad_s = Some(initial);
-        let agreement =
-            if self.parts == Some(1) { COARSE_AGREEMENT_OF_ONE } else { COARSE_AGREEMENT };
+        // A single mark has no symmetry to be mistaken for another, and registration less to go by.
+        let rivals = if self.parts == Some(1) { 1 } else { self.windings };
+        let half_way = 0.5 / (rivals as f32 + 1.0);
+        let agreement = half_way.clamp(COARSE_AGREEMENT, MOST_COARSE_AGREEMENT);
         if (initial - self.omega_rad_s).abs() > agreement * self.omega_rad_s.abs() {
             return self.refuse(Reason::Ambiguous);
         }
@@ -515,56 +508,6 @@ impl Measurement {
         self.stage = Stage::Done;
     }
 
-    /// Combines the witnesses of the lock, or says why the reading stays coarse.
-    fn verdict(&mut self, window: &Window<'_>, stated: &Stated) {
-        let witness = |omega: Option<f32>, sigma: Option<f32>| {
-            Some(Estimate { omega_rad_s: omega?, sigma_rad_s: sigma? })
-        };
-        let lock = witness(self.evidence.lock_rad_s, self.evidence.lock_sigma_rad_s);
-        let phase = witness(self.evidence.phase_rad_s, self.evidence.phase_sigma_rad_s);
-        let window_s = window.duration_us as f32 * 1e-6;
-        if let (Some(lock), Some(phase)) = (lock, phase) {
-            let apart = (lock.omega_rad_s - phase.omega_rad_s).abs();
-            let sigma =
-                sqrt(lock.sigma_rad_s * lock.sigma_rad_s + phase.sigma_rad_s * phase.sigma_rad_s);
-            let agree = apart < (LOCK_AGREEMENT * lock.omega_rad_s.abs()).max(LOCK_SIGMAS * sigma);
-            let whole = self.evidence.fractional_deviation.is_some_and(|d| d < MOST_DEVIATION);
-            let both = combine(lock, phase);
-            let sharp = both.sigma_rad_s < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
-            let long = self.wanted_us <= 1.02 * window.duration_us as f32;
-            if !agree || !whole {
-                self.status = Status::Refused(Reason::Ambiguous);
-            } else if sharp && long {
-                self.estimate = both;
-                self.status = Status::Locked;
-            }
-        }
-        if lock.is_none() && !self.coarse_stands(phase) {
-            self.status = Status::Refused(Reason::Ambiguous);
-        }
-        let clock = stated.clock_sigma_ppm * 1e-6 * self.estimate.omega_rad_s;
-        let roll = if self.drift_px_s > STILL_PX_S {
-            ROLL_RAD_PER_PX * self.drift_px_s * roll_share(window_s)
-        } else {
-            0.0
-        };
-        let own = self.estimate.sigma_rad_s;
-        self.estimate.sigma_rad_s = sqrt(own * own + clock * clock);
-        self.roll_sigma_rad_s = roll;
-    }
-
-    /// Whether a reading without a lock may stand: it has no long baseline to contradict it, so the phase must advance
-    /// evenly through the window, and all segments must turn alike.
-    fn coarse_stands(&self, phase: Option<Estimate>) -> bool {
-        let omega = self.estimate.omega_rad_s;
-        let even = phase.is_some_and(|phase| {
-            (phase.omega_rad_s - omega).abs() < COARSE_PHASE * omega.abs()
-                && phase.sigma_rad_s < COARSE_PHASE_SIGMA * omega.abs()
-        });
-        let alike = |rate: &f32| (rate - omega).abs() < COARSE_SPREAD * omega.abs();
-        even && self.rates.iter().all(alike)
-    }
-
     /// The result, once [`Self::step`] has returned `true`.
     #[must_use]
     pub fn result(&self) -> Outcome {
@@ -612,21 +555,4 @@ pub struct Outcome {
     pub evidence: Evidence,
     /// Window in microseconds that a lock needs, 0 when the speed is not known.
     pub wanted_us: f32,
-}
-
-/// Mean weighted by the inverse variances. The witnesses look at the same events, so the error is not taken to
-/// shrink by having two.
-fn combine(a: Estimate, b: Estimate) -> Estimate {
-    let (va, vb) = (a.sigma_rad_s * a.sigma_rad_s, b.sigma_rad_s * b.sigma_rad_s);
-    let (wa, wb) = (vb / (va + vb), va / (va + vb));
-    Estimate {
-        omega_rad_s: a.omega_rad_s * wa + b.omega_rad_s * wb,
-        sigma_rad_s: sqrt(wa * va + wb * vb),
-    }
-}
-
-/// Share of the tremor's roll rate that is left in the mean over a window: tremor swings back and forth at a
-/// few hertz, so a longer window averages more of it.
-fn roll_share(window_s: f32) -> f32 {
-    (0.1 / window_s).min(1.0)
 }

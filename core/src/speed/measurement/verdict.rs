@@ -1,0 +1,94 @@
+//! The verdict on a rotor: what the witnesses say together, and how sure they are.
+
+use super::super::baseline::Estimate;
+use super::{Measurement, Stated};
+use crate::math::sqrt;
+use crate::reading::{Reason, Status};
+use crate::store::Window;
+
+/// Farthest deviation of the fractional-baseline test, as a share of the angle of symmetry.
+const MOST_DEVIATION: f32 = 0.03;
+/// Witnesses of the lock may differ by this much, or by eight standard errors.
+const LOCK_AGREEMENT: f32 = 2e-3;
+const LOCK_SIGMAS: f32 = 8.0;
+/// A lock with a larger relative error is only coarse.
+const MOST_LOCK_SIGMA: f32 = 3e-3;
+/// A coarse reading's phase must give its speed and be straight within these shares, and the initial alignment of
+/// every segment must give it within the last.
+const COARSE_PHASE: f32 = 0.05;
+const COARSE_PHASE_SIGMA: f32 = 0.03;
+const COARSE_SPREAD: f32 = 0.5;
+/// Roll of a hand-held camera for each pixel of shift: tremor turns the camera by about one milliradian as
+/// it shifts the image by one pixel.
+const ROLL_RAD_PER_PX: f32 = 1e-3;
+/// Slower wandering of the centre than this in px/s is the measurement's own noise.
+const STILL_PX_S: f32 = 6.0;
+
+impl Measurement {
+    /// Combines the witnesses of the lock, or says why the reading stays coarse.
+    pub(super) fn verdict(&mut self, window: &Window<'_>, stated: &Stated) {
+        let witness = |omega: Option<f32>, sigma: Option<f32>| {
+            Some(Estimate { omega_rad_s: omega?, sigma_rad_s: sigma? })
+        };
+        let lock = witness(self.evidence.lock_rad_s, self.evidence.lock_sigma_rad_s);
+        let phase = witness(self.evidence.phase_rad_s, self.evidence.phase_sigma_rad_s);
+        let window_s = window.duration_us as f32 * 1e-6;
+        if let (Some(lock), Some(phase)) = (lock, phase) {
+            let apart = (lock.omega_rad_s - phase.omega_rad_s).abs();
+            let sigma =
+                sqrt(lock.sigma_rad_s * lock.sigma_rad_s + phase.sigma_rad_s * phase.sigma_rad_s);
+            let agree = apart < (LOCK_AGREEMENT * lock.omega_rad_s.abs()).max(LOCK_SIGMAS * sigma);
+            let whole = self.evidence.fractional_deviation.is_some_and(|d| d < MOST_DEVIATION);
+            let both = combine(lock, phase);
+            let sharp = both.sigma_rad_s < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
+            let long = self.wanted_us <= 1.02 * window.duration_us as f32;
+            if !agree || !whole {
+                self.status = Status::Refused(Reason::Ambiguous);
+            } else if sharp && long {
+                self.estimate = both;
+                self.status = Status::Locked;
+            }
+        }
+        if lock.is_none() && !self.coarse_stands(phase) {
+            self.status = Status::Refused(Reason::Ambiguous);
+        }
+        let clock = stated.clock_sigma_ppm * 1e-6 * self.estimate.omega_rad_s;
+        let roll = if self.drift_px_s > STILL_PX_S {
+            ROLL_RAD_PER_PX * self.drift_px_s * roll_share(window_s)
+        } else {
+            0.0
+        };
+        let own = self.estimate.sigma_rad_s;
+        self.estimate.sigma_rad_s = sqrt(own * own + clock * clock);
+        self.roll_sigma_rad_s = roll;
+    }
+
+    /// Whether a reading without a lock may stand: it has no long baseline to contradict it, so the phase must advance
+    /// evenly through the window, and all segments must turn alike.
+    fn coarse_stands(&self, phase: Option<Estimate>) -> bool {
+        let omega = self.estimate.omega_rad_s;
+        let even = phase.is_some_and(|phase| {
+            (phase.omega_rad_s - omega).abs() < COARSE_PHASE * omega.abs()
+                && phase.sigma_rad_s < COARSE_PHASE_SIGMA * omega.abs()
+        });
+        let alike = |rate: &f32| (rate - omega).abs() < COARSE_SPREAD * omega.abs();
+        even && self.rates.iter().all(alike)
+    }
+}
+
+/// Mean weighted by the inverse variances. The witnesses look at the same events, so the error is not taken to
+/// shrink by having two.
+fn combine(a: Estimate, b: Estimate) -> Estimate {
+    let (va, vb) = (a.sigma_rad_s * a.sigma_rad_s, b.sigma_rad_s * b.sigma_rad_s);
+    let (wa, wb) = (vb / (va + vb), va / (va + vb));
+    Estimate {
+        omega_rad_s: a.omega_rad_s * wa + b.omega_rad_s * wb,
+        sigma_rad_s: sqrt(wa * va + wb * vb),
+    }
+}
+
+/// Share of the tremor's roll rate that is left in the mean over a window: tremor swings back and forth at a
+/// few hertz, so a longer window averages more of it.
+fn roll_share(window_s: f32) -> f32 {
+    (0.1 / window_s).min(1.0)
+}
