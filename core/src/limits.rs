@@ -39,5 +39,8 @@ pub const MAX_BLADES: u8 = 8;
 /// Slice pairs at one baseline.
 pub const MAX_PAIRS: usize = 16;
 
-/// Rotors by every line before the choice: 24 x 28 B.
-pub const MAX_CANDIDATES: usize = 24;
+/// Rotors by every line before the choice: 20 x 32 B.
+pub const MAX_CANDIDATES: usize = 20;
+
+/// Of these, those that are measured in one window at most: 12 x 36 B.
+pub const MAX_SUSPECTS: usize = 12;

@@ -8,7 +8,7 @@
 use heapless::Vec;
 
 use crate::event::{Event, Geometry, GyroSample};
-use crate::limits::{MAX_CANDIDATES, MAX_ROTORS};
+use crate::limits::{MAX_ROTORS, MAX_SUSPECTS};
 use crate::reading::{Evidence, Frame, Reading, Reason, RotorReading, Status};
 use crate::registration::Icp;
 use crate::rotors::extraction::{self, Extraction, View, weigh_heat};
@@ -46,8 +46,6 @@ const SEARCH_EVERY: u8 = 10;
 const LEAST_EVENTS: u64 = 300;
 /// Share of events lost beyond which the rest is not trusted.
 const MOST_LOST: f32 = 0.5;
-/// Candidates that are measured in one window at most.
-const MOST_MEASURED: usize = 12;
 /// Time going back by more than this restarts the window; less is disorder, and the event is left out.
 const CLOCK_RESET_US: u64 = 1_000_000;
 /// Latest sensor time that is believed: beyond it (292 000 years) sums of times could overflow.
@@ -186,7 +184,7 @@ pub struct Tachometer<'m> {
     polar: PolarTrack,
     scanner: Scanner,
     scratch: Scratch,
-    candidates: Vec<Suspect, MAX_CANDIDATES>,
+    candidates: Vec<Suspect, MAX_SUSPECTS>,
     outcomes: Vec<Outcome, MAX_ROTORS>,
     in_step_hz: Option<f32>,
     tracker: Tracker,
@@ -468,8 +466,7 @@ impl<'m> Tachometer<'m> {
             let measured = |o: &&Outcome| o.status.reason().is_none();
             self.outcomes.iter().filter(measured).any(|o| o.found.disc.overlaps(disc))
         };
-        let next = (index..self.candidates.len().min(MOST_MEASURED))
-            .find(|i| !taken(&self.candidates[*i].found.disc));
+        let next = (index..self.candidates.len()).find(|i| !taken(&self.candidates[*i].found.disc));
         let Some(next) = next else {
             self.job = Job::Idle;
             return true;
