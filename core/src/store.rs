@@ -431,7 +431,8 @@ impl<'a> Window<'a> {
         parts.into_iter().take(self.segments).flat_map(|part| part.iter().copied())
     }
 
-    /// Events that each stand for the same number of arrived ones, at most `most` of those for which `inside` gives a value.
+    /// Events that each stand for the same number of arrived ones, at most `most` of those for which `inside` gives a value,
+    /// and how many of these are stored.
     ///
     /// The stored events are dense at the start of each segment; whoever looks for frequencies must not take
     /// that rhythm for one of the scene.
@@ -439,10 +440,11 @@ impl<'a> Window<'a> {
         &self,
         most: usize,
         inside: impl Fn(StoredEvent) -> Option<T>,
-    ) -> impl Iterator<Item = (StoredEvent, T)> {
-        let (mut weight, mut coarsest) = (0_u64, 0);
+    ) -> (usize, impl Iterator<Item = (StoredEvent, T)>) {
+        let (mut count, mut weight, mut coarsest) = (0, 0_u64, 0);
         for event in self.events() {
             if inside(event).is_some() {
+                count += 1;
                 weight += 1 << event.weight_log2();
                 coarsest = coarsest.max(event.weight_log2());
             }
@@ -450,7 +452,7 @@ impl<'a> Window<'a> {
         // Fixed-point, so that any ratio thins evenly.
         let stride = ((weight << 8) / most.max(1) as u64 + 1).max(1 << (coarsest + 8));
         let (mut passed, mut next) = (0_u64, 0_u64);
-        self.events().filter_map(move |event| {
+        let even = self.events().filter_map(move |event| {
             let value = inside(event)?;
             let kept = passed >= next;
             passed += 1 << (event.weight_log2() + 8);
@@ -458,7 +460,8 @@ impl<'a> Window<'a> {
                 next += stride;
             }
             kept.then_some((event, value))
-        })
+        });
+        (count, even)
     }
 
     /// Number of stored events.
@@ -540,6 +543,7 @@ mod tests {
         let kept: Vec<_> = store
             .window(6, u64::MAX)
             .even(100, |event| Some(event.since(0)))
+            .1
             .map(|(_, t_us)| t_us)
             .collect();
         assert!(kept.len() > 80 && kept.len() <= 101, "{}", kept.len());

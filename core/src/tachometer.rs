@@ -379,7 +379,7 @@ impl<'m> Tachometer<'m> {
         }
     }
 
-    /// Advances the measurement by at most `steps` steps, each of at most about a million instructions.
+    /// Advances the measurement by at most `steps` steps, each of a few million instructions at most (`evtach bench cost`).
     pub fn poll(&mut self, steps: u32) -> Poll {
         for _ in 0..steps {
             if self.window_segments == 0 {

@@ -20,9 +20,10 @@ const REACH_RADII: f32 = 1.2;
 const TRIM: f32 = 2.5;
 
 /// What is minimised.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Residual {
     /// Positions only, turning about the centre: needs no idea of the speed (initial alignment, thin slices).
+    #[default]
     FixedAxis,
     /// Positions only, yaw and shift free: needs no idea of the centre either.
     FreeAxis,
@@ -50,116 +51,130 @@ pub struct Icp {
     /// The later slice.
     pub second: Slice,
     grid: Grid,
+    run: Run,
 }
 
-impl Icp {
-    /// Registers both ways and averages, so that the bias of matching a sparse slice to a dense one cancels.
-    ///
-    /// `start_rad` is the yaw to start from, `radius_px` the rotor's radius.
-    /// Cost: about 300 instructions a point and iteration, 10 to 20 iterations in all.
-    pub fn both_ways(
-        &mut self,
-        start_rad: f32,
-        radius_px: f32,
-        residual: Residual,
-    ) -> Option<Registered> {
-        let there = self.there(start_rad, radius_px, residual)?;
-        self.back(there, start_rad, radius_px, residual)
-    }
-
-    /// The first half of [`Self::both_ways`]: the first slice onto the second.
-    pub fn there(
-        &mut self,
-        start_rad: f32,
-        radius_px: f32,
-        residual: Residual,
-    ) -> Option<Registered> {
-        self.grid.build(&self.second, REACH_RADII * radius_px);
-        one_way(&self.first, &self.second, &self.grid, start_rad, radius_px, residual)
-    }
-
-    /// The second half of [`Self::both_ways`]: the second slice onto the first, averaged with the first half.
-    pub fn back(
-        &mut self,
-        there: Registered,
-        start_rad: f32,
-        radius_px: f32,
-        residual: Residual,
-    ) -> Option<Registered> {
-        self.grid.build(&self.first, REACH_RADII * radius_px);
-        let back = one_way(&self.second, &self.first, &self.grid, -start_rad, radius_px, residual)?;
-        Some(Registered {
-            yaw_rad: 0.5 * (there.yaw_rad - back.yaw_rad),
-            matched: 0.5 * (there.matched + back.matched),
-        })
-    }
-}
-
-fn one_way(
-    source: &[SlicePoint],
-    target: &[SlicePoint],
-    grid: &Grid,
+/// A registration in progress.
+#[derive(Clone, Copy, Debug, Default)]
+struct Run {
     start_rad: f32,
     radius_px: f32,
     residual: Residual,
-) -> Option<Registered> {
-    let lambda_px_per_s = match residual {
+    /// Result of the first half, the first slice onto the second; then the second half runs.
+    there: Option<Registered>,
+    rigid: Rigid,
+    /// The yaw is summed besides, as it may pass pi.
+    yaw_rad: f32,
+    limit_px: f32,
+    iterations: u8,
+}
+
+/// What a step of a registration left.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Progress {
+    /// More steps to come.
+    Running,
+    /// Settled, or `None` when too little matched.
+    Done(Option<Registered>),
+}
+
+impl Icp {
+    /// Starts to register [`Icp::first`] onto [`Icp::second`] and back: the average of both ways cancels the bias of
+    /// matching a sparse slice to a dense one.
+    ///
+    /// `start_rad` is the yaw to start from, `radius_px` the rotor's radius.
+    pub fn start(&mut self, start_rad: f32, radius_px: f32, residual: Residual) {
+        self.run = Run { start_rad, radius_px, residual, ..Run::default() };
+        self.start_half(start_rad);
+    }
+
+    fn start_half(&mut self, yaw_rad: f32) {
+        let target = if self.run.there.is_none() { &self.second } else { &self.first };
+        self.grid.build(target, REACH_RADII * self.run.radius_px);
+        self.run.rigid = Rigid::yaw(yaw_rad);
+        self.run.yaw_rad = yaw_rad;
+        self.run.limit_px = f32::MAX;
+        self.run.iterations = 0;
+    }
+
+    /// One iteration. Cost: about 300 instructions a point; 10 to 20 iterations in all.
+    pub fn step(&mut self) -> Progress {
+        let back = self.run.there.is_some();
+        let (source, target) =
+            if back { (&self.second, &self.first) } else { (&self.first, &self.second) };
+        let Some((turn_rad, matched)) = iterate(&mut self.run, source, target, &self.grid) else {
+            return Progress::Done(None);
+        };
+        self.run.iterations += 1;
+        if turn_rad.abs() >= SETTLED_RAD && self.run.iterations < MOST_ITERATIONS {
+            return Progress::Running;
+        }
+        let here = Registered { yaw_rad: self.run.yaw_rad, matched };
+        let Some(there) = self.run.there else {
+            self.run.there = Some(here);
+            self.start_half(-self.run.start_rad);
+            return Progress::Running;
+        };
+        Progress::Done(Some(Registered {
+            yaw_rad: 0.5 * (there.yaw_rad - here.yaw_rad),
+            matched: 0.5 * (there.matched + here.matched),
+        }))
+    }
+}
+
+/// Matches the source to the target once and turns it; the turn in radians and the share that matched.
+fn iterate(
+    run: &mut Run,
+    source: &[SlicePoint],
+    target: &[SlicePoint],
+    grid: &Grid,
+) -> Option<(f32, f32)> {
+    let lambda_px_per_s = match run.residual {
         Residual::FixedAxis | Residual::FreeAxis => 0.0,
         // Twice the mean speed of the points: flat optimum between one and four times.
-        Residual::Helicoid { omega_rad_s } => 1.4 * radius_px * omega_rad_s.abs(),
+        Residual::Helicoid { omega_rad_s } => 1.4 * run.radius_px * omega_rad_s.abs(),
     };
     let metric = Metric { lambda_px_per_s, reach_px: REACH_PX, same_polarity: true };
-    let mut rigid = Rigid::yaw(start_rad);
-    // The yaw is summed besides, as it may pass pi.
-    let mut yaw_rad = start_rad;
-    let mut limit_px = f32::MAX;
-    let mut matched = 0.0;
-    for _ in 0..MOST_ITERATIONS {
-        let mut point = PointToPoint::default();
-        let mut helicoid = PointToHelicoid::default();
-        let (mut matches, mut found, mut squares) = (0, 0, 0.0_f32);
-        for from in source {
-            let (x_px, y_px) = rigid.apply(from.x_px, from.y_px);
-            let query = SlicePoint { x_px, y_px, ..*from };
-            let Some((index, distance2)) = grid.nearest(target, query, &metric) else { continue };
-            let to = &target[index];
-            found += 1;
-            match residual {
-                Residual::FixedAxis | Residual::FreeAxis => {
-                    squares += distance2;
-                    if distance2 <= limit_px * limit_px {
-                        point.add((x_px, y_px), (to.x_px, to.y_px));
-                        matches += 1;
-                    }
+    let mut point = PointToPoint::default();
+    let mut helicoid = PointToHelicoid::default();
+    let (mut matches, mut found, mut squares) = (0, 0, 0.0_f32);
+    for from in source {
+        let (x_px, y_px) = run.rigid.apply(from.x_px, from.y_px);
+        let query = SlicePoint { x_px, y_px, ..*from };
+        let Some((index, distance2)) = grid.nearest(target, query, &metric) else { continue };
+        let to = &target[index];
+        found += 1;
+        match run.residual {
+            Residual::FixedAxis | Residual::FreeAxis => {
+                squares += distance2;
+                if distance2 <= run.limit_px * run.limit_px {
+                    point.add((x_px, y_px), (to.x_px, to.y_px));
+                    matches += 1;
                 }
-                Residual::Helicoid { omega_rad_s } => {
-                    let r = sqrt(x_px * x_px + y_px * y_px).max(1.0);
-                    let u = (-y_px / r, x_px / r);
-                    let along = (to.x_px - x_px) * u.0 + (to.y_px - y_px) * u.1
-                        - r * omega_rad_s * (to.tau_s - from.tau_s);
-                    squares += along * along;
-                    if along.abs() <= limit_px {
-                        helicoid.add(u, r, along);
-                        matches += 1;
-                    }
+            }
+            Residual::Helicoid { omega_rad_s } => {
+                let r = sqrt(x_px * x_px + y_px * y_px).max(1.0);
+                let u = (-y_px / r, x_px / r);
+                let along = (to.x_px - x_px) * u.0 + (to.y_px - y_px) * u.1
+                    - r * omega_rad_s * (to.tau_s - from.tau_s);
+                squares += along * along;
+                if along.abs() <= run.limit_px {
+                    helicoid.add(u, r, along);
+                    matches += 1;
                 }
             }
         }
-        if matches < LEAST_MATCHES {
-            return None;
-        }
-        limit_px = TRIM * sqrt(squares / found as f32);
-        matched = matches as f32 / source.len() as f32;
-        let (turn_rad, shift_px) = match residual {
-            Residual::FixedAxis => (point.about_origin()?, (0.0, 0.0)),
-            Residual::FreeAxis => point.solve()?,
-            Residual::Helicoid { .. } => helicoid.solve()?,
-        };
-        rigid = rigid.then(turn_rad, shift_px);
-        yaw_rad += turn_rad;
-        if turn_rad.abs() < SETTLED_RAD {
-            break;
-        }
     }
-    Some(Registered { yaw_rad, matched })
+    if matches < LEAST_MATCHES {
+        return None;
+    }
+    run.limit_px = TRIM * sqrt(squares / found as f32);
+    let (turn_rad, shift_px) = match run.residual {
+        Residual::FixedAxis => (point.about_origin()?, (0.0, 0.0)),
+        Residual::FreeAxis => point.solve()?,
+        Residual::Helicoid { .. } => helicoid.solve()?,
+    };
+    run.rigid = run.rigid.then(turn_rad, shift_px);
+    run.yaw_rad += turn_rad;
+    Some((turn_rad, matches as f32 / source.len() as f32))
 }

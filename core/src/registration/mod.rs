@@ -5,5 +5,5 @@ pub mod icp;
 pub mod rigid;
 pub mod slice;
 
-pub use icp::{Icp, Registered, Residual};
+pub use icp::{Icp, Progress, Registered, Residual};
 pub use slice::{Cut, Slice, SlicePoint};

@@ -11,6 +11,12 @@ pub struct Rigid {
     shift_px: Vector2<f32>,
 }
 
+impl Default for Rigid {
+    fn default() -> Self {
+        Self { rotation: Matrix2::identity(), shift_px: Vector2::zeros() }
+    }
+}
+
 impl Rigid {
     /// The rotation by `yaw_rad`, positive = clockwise on the screen.
     #[must_use]

@@ -59,7 +59,7 @@ impl Coherence {
         self.counts = [[0; COHERENCE_CELLS]; 2];
         let mid_us = (window.duration_us / 2) as i32;
         let rate = TurnRate::from_rad_s(line_hz * TAU);
-        for (event, ()) in window.even(usize::MAX, |_| Some(())) {
+        for (event, ()) in window.even(usize::MAX, |_| Some(())).1 {
             let (sin, cos) = rate.after(event.since(window.start_us) - mid_us).sin_cos();
             let index = grid.index(event.x(), event.y());
             let bank = usize::from(event.is_on());

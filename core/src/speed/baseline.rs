@@ -12,7 +12,7 @@ use super::polar::Annulus;
 use super::statistics::{mean_and_error, student_over_normal};
 use crate::limits::MAX_PAIRS;
 use crate::math::TAU;
-use crate::registration::{Cut, Icp, Registered, Residual};
+use crate::registration::{Cut, Icp, Progress, Residual};
 use crate::rotors::Disc;
 use crate::store::Window;
 
@@ -65,8 +65,8 @@ pub struct Pairs {
     pairs: u32,
     next: u32,
     folds: u32,
-    /// The pair's first half.
-    there: Option<Registered>,
+    /// Whether the next pair is being registered.
+    registering: bool,
     yaws: Vec<f32, MAX_PAIRS>,
 }
 
@@ -81,30 +81,29 @@ impl Pairs {
         let folds = (SLICE_EVENTS / in_slice.max(1.0)) as u32;
         let folds = folds.clamp(1, MOST_FOLDS).min(1 + (0.5 * room) as u32);
         let pairs = pairs.min(MAX_PAIRS as u32);
-        Self { pace, periods, pairs, next: 0, folds, there: None, yaws: Vec::new() }
+        Self { pace, periods, pairs, next: 0, folds, registering: false, yaws: Vec::new() }
     }
 
-    /// Registers the next pair one way, then the other; `true` once all are done.
-    /// Cost: about 1.5 million instructions.
+    /// Cuts the next pair, or advances its registration by one iteration; `true` once all are done.
+    /// Cost: at most a million instructions.
     pub fn step(&mut self, window: &Window<'_>, icp: &mut Icp) -> bool {
         if self.next >= self.pairs {
             return true;
         }
         let angle_rad = self.pace.signed_angle_rad();
         let start_rad = (self.periods - libm::roundf(self.periods)) * angle_rad;
-        let residual = Residual::Helicoid { omega_rad_s: self.pace.omega_rad_s };
-        let radius_px = self.pace.disc.radius_px;
-        if let Some(there) = self.there.take() {
-            if let Some(found) = icp.back(there, start_rad, radius_px, residual) {
-                self.yaws.push(found.yaw_rad - start_rad).ok();
-            }
-        } else {
+        if !self.registering {
             self.cut(window, icp);
-            self.there = icp.there(start_rad, radius_px, residual);
-            if self.there.is_some() {
-                return false;
-            }
+            let residual = Residual::Helicoid { omega_rad_s: self.pace.omega_rad_s };
+            icp.start(start_rad, self.pace.disc.radius_px, residual);
+            self.registering = true;
+            return false;
         }
+        let Progress::Done(found) = icp.step() else { return false };
+        if let Some(found) = found {
+            self.yaws.push(found.yaw_rad - start_rad).ok();
+        }
+        self.registering = false;
         self.next += 1;
         self.next >= self.pairs
     }

@@ -12,7 +12,7 @@
 use heapless::Vec;
 
 use super::polar::Annulus;
-use crate::registration::{Icp, Residual, Slice, SlicePoint};
+use crate::registration::{Icp, Progress, Registered, Residual, Slice, SlicePoint};
 use crate::rotors::Disc;
 use crate::store::{WINDOW_SEGMENTS, Window};
 
@@ -49,6 +49,8 @@ pub struct Ladder {
     passed: usize,
     level: u8,
     first_us: f32,
+    /// Baseline of the level that is being registered; 0 between levels.
+    baseline_s: f32,
     rate: Option<f32>,
     /// Whether the rate rests on a motion large enough to judge the next by.
     seen: bool,
@@ -66,6 +68,7 @@ impl Ladder {
             passed: 0,
             level: 0,
             first_us: 0.0,
+            baseline_s: 0.0,
             rate: None,
             seen: false,
         }
@@ -88,8 +91,15 @@ impl Ladder {
         })
     }
 
-    /// Climbs one level; `true` at the top. Cost: up to two million instructions.
+    /// Cuts the slices of the next level, or advances their registration by one iteration; `true` at the top.
+    /// Cost: at most half a million instructions.
     pub fn step(&mut self, window: &Window<'_>, icp: &mut Icp) -> bool {
+        if self.baseline_s > 0.0 {
+            return match icp.step() {
+                Progress::Running => false,
+                Progress::Done(found) => found.is_none_or(|found| !self.climb(found)),
+            };
+        }
         if self.level == 0 {
             self.size = (self.placed(window).count() / SLICES).min(MOST_EVENTS);
             if self.size < LEAST_EVENTS {
@@ -100,11 +110,11 @@ impl Ladder {
             self.passed = self.size;
         }
         self.level += 1;
-        self.climb(window, icp).is_none() || self.level >= MOST_LEVELS
+        self.level > MOST_LEVELS || !self.cut(window, icp)
     }
 
-    /// Registers the first slice to the next later one; `None` when the ladder ends.
-    fn climb(&mut self, window: &Window<'_>, icp: &mut Icp) -> Option<()> {
+    /// Cuts the later slice of the next level and starts its registration; `false` when the ladder ends.
+    fn cut(&mut self, window: &Window<'_>, icp: &mut Icp) -> bool {
         let length = self.size.max((GROWTH * self.passed as f32) as usize);
         let mut events = self.placed(window).skip(self.passed);
         let (second_us, length_us) = take(&mut events, length, self.size, &mut icp.second);
@@ -116,20 +126,27 @@ impl Ladder {
             || rate_so_far * baseline_s > MOST_TURN_RAD
             || rate_so_far * length_us * 1e-6 > MOST_BLUR_RAD
         {
-            return None;
+            return false;
         }
         let start_rad = self.rate.map_or(0.0, |rate| rate * baseline_s);
-        let registered = icp.both_ways(start_rad, self.disc.radius_px, self.residual)?;
-        let next = registered.yaw_rad / baseline_s;
+        icp.start(start_rad, self.disc.radius_px, self.residual);
+        self.baseline_s = baseline_s;
+        true
+    }
+
+    /// Takes the rate of a level; `false` when the match jumped to another blade.
+    fn climb(&mut self, found: Registered) -> bool {
+        let next = found.yaw_rad / self.baseline_s;
+        self.baseline_s = 0.0;
         let jumped = |before: f32| {
             self.seen && (next - before).abs() > MOST_CHANGE * before.abs().max(next.abs())
         };
         if self.rate.is_some_and(jumped) {
-            return None;
+            return false;
         }
-        self.seen = registered.yaw_rad.abs() * self.disc.radius_px > SEEN_PX;
+        self.seen = found.yaw_rad.abs() * self.disc.radius_px > SEEN_PX;
         self.rate = Some(next);
-        Some(())
+        true
     }
 }
 

@@ -89,8 +89,9 @@ pub fn track(window: &Window<'_>, disc: Disc, track: &mut PolarTrack) -> usize {
     track.clear();
     let annulus = Annulus::of(disc);
     let mid_us = (window.duration_us / 2) as i32;
-    for (event, place) in window.even(POLAR_EVENTS, |event| annulus.place(event)) {
+    let (total, even) = window.even(POLAR_EVENTS, |event| annulus.place(event));
+    for (event, place) in even {
         track.push(PolarEvent::new(event, place, window.start_us, mid_us)).ok();
     }
-    window.events().filter(|event| annulus.place(*event).is_some()).count()
+    total
 }
