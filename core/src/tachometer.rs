@@ -213,7 +213,7 @@ impl<'m> Tachometer<'m> {
             job: Job::Idle,
             polar: PolarTrack::new(),
             scanner: Scanner::default(),
-            scratch: Scratch::Measure(Icp::default()),
+            scratch: Scratch::Measure(Icp::EMPTY),
             candidates: Vec::new(),
             outcomes: Vec::new(),
             in_step_hz: None,
@@ -472,7 +472,7 @@ impl<'m> Tachometer<'m> {
             return true;
         };
         if !matches!(self.scratch, Scratch::Measure(_)) {
-            self.scratch = Scratch::Measure(Icp::default());
+            self.scratch = Scratch::Measure(Icp::EMPTY);
         }
         let Suspect { found, followed } = self.candidates[next];
         let measurement = match followed {

@@ -16,15 +16,14 @@ pub struct Grid {
     half_px: f32,
 }
 
-impl Default for Grid {
-    fn default() -> Self {
-        Self {
-            heads: [END; GRID_CELLS_SIDE * GRID_CELLS_SIDE],
-            next: [END; SLICE_POINTS],
-            cell_px: LEAST_CELL_PX,
-            half_px: 0.0,
-        }
-    }
+impl Grid {
+    /// No points. A constant, so that it is copied into place instead of being built on the stack.
+    pub const EMPTY: Self = Self {
+        heads: [END; GRID_CELLS_SIDE * GRID_CELLS_SIDE],
+        next: [END; SLICE_POINTS],
+        cell_px: LEAST_CELL_PX,
+        half_px: 0.0,
+    };
 }
 
 /// How far apart two events are: time weighs `lambda_px_per_s` pixels a second.
@@ -130,7 +129,7 @@ mod tests {
             on: random() > 0.5,
         };
         let points: Vec<_> = (0..SLICE_POINTS).map(|_| point()).collect();
-        let mut grid = Grid::default();
+        let mut grid = Grid::EMPTY;
         grid.build(&points, 85.0);
         let metric = Metric { lambda_px_per_s: 5e3, reach_px: 12.0, same_polarity: true };
         for _ in 0..2_000 {

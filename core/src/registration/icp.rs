@@ -20,10 +20,9 @@ const REACH_RADII: f32 = 1.2;
 const TRIM: f32 = 2.5;
 
 /// What is minimised.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Residual {
     /// Positions only, turning about the centre: needs no idea of the speed (initial alignment, thin slices).
-    #[default]
     FixedAxis,
     /// Positions only, yaw and shift free: needs no idea of the centre either.
     FreeAxis,
@@ -44,7 +43,7 @@ pub struct Registered {
 }
 
 /// Memory of a registration: two slices and a grid.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Icp {
     /// The earlier slice.
     pub first: Slice,
@@ -55,7 +54,7 @@ pub struct Icp {
 }
 
 /// A registration in progress.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Run {
     start_rad: f32,
     radius_px: f32,
@@ -78,13 +77,30 @@ pub enum Progress {
     Done(Option<Registered>),
 }
 
+impl Run {
+    const EMPTY: Self = Self {
+        start_rad: 0.0,
+        radius_px: 0.0,
+        residual: Residual::FixedAxis,
+        there: None,
+        rigid: Rigid::IDENTITY,
+        yaw_rad: 0.0,
+        limit_px: f32::MAX,
+        iterations: 0,
+    };
+}
+
 impl Icp {
+    /// Nothing to register. A constant, so that it is copied into place instead of being built on the stack.
+    pub const EMPTY: Self =
+        Self { first: Slice::new(), second: Slice::new(), grid: Grid::EMPTY, run: Run::EMPTY };
+
     /// Starts to register [`Icp::first`] onto [`Icp::second`] and back: the average of both ways cancels the bias of
     /// matching a sparse slice to a dense one.
     ///
     /// `start_rad` is the yaw to start from, `radius_px` the rotor's radius.
     pub fn start(&mut self, start_rad: f32, radius_px: f32, residual: Residual) {
-        self.run = Run { start_rad, radius_px, residual, ..Run::default() };
+        self.run = Run { start_rad, radius_px, residual, ..Run::EMPTY };
         self.start_half(start_rad);
     }
 

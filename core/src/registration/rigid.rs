@@ -11,13 +11,11 @@ pub struct Rigid {
     shift_px: Vector2<f32>,
 }
 
-impl Default for Rigid {
-    fn default() -> Self {
-        Self { rotation: Matrix2::identity(), shift_px: Vector2::zeros() }
-    }
-}
-
 impl Rigid {
+    /// No turn, no shift.
+    pub const IDENTITY: Self =
+        Self { rotation: Matrix2::new(1.0, 0.0, 0.0, 1.0), shift_px: Vector2::new(0.0, 0.0) };
+
     /// The rotation by `yaw_rad`, positive = clockwise on the screen.
     #[must_use]
     pub fn yaw(yaw_rad: f32) -> Self {
