@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Every check, and the tools they need. Continuous integration and people run this very script.
 #
-#   ./ci.sh            all steps, in this order: install format lint test docs image deny
+#   ./ci.sh            all steps, in this order: install format lint test docs image fuzz deny
 #   ./ci.sh STEP...    only these
 #
 # Not more than half an hour on two cores from nothing; a few minutes when built before.
@@ -61,6 +61,22 @@ step_image() {
   cargo fw
 }
 
+# A smoke run over the seeds, without cargo-fuzz and its instrumentation; fuzz/run.sh is the real thing.
+step_fuzz() {
+  if ! rustup toolchain list | grep -q '^nightly'; then
+    echo "skipped: no nightly toolchain"
+    return
+  fi
+  (cd fuzz && cargo build --release)
+  local found
+  found=$(mktemp -d)
+  for seeds in fuzz/seeds/*/; do
+    echo "fuzzing $(basename "$seeds")"
+    "fuzz/target/release/$(basename "$seeds")" "$found" "$seeds" \
+      -max_total_time=2 -rss_limit_mb=1024 -timeout=20 -artifact_prefix="$found/" 2>&1 | tail -n 1
+  done
+}
+
 # Building cargo-deny takes two and a half minutes on two cores: done where CI is set, left to people.
 step_deny() {
   if ! command -v cargo-deny >/dev/null; then
@@ -81,10 +97,10 @@ step_deny() {
 }
 
 steps=("$@")
-[ ${#steps[@]} -gt 0 ] || steps=(install format lint test docs image deny)
+[ ${#steps[@]} -gt 0 ] || steps=(install format lint test docs image fuzz deny)
 for step in "${steps[@]}"; do
   if ! declare -F "step_$step" >/dev/null; then
-    echo "ci.sh: no step \"$step\": choose from install format lint test docs image deny"
+    echo "ci.sh: no step \"$step\": choose from install format lint test docs image fuzz deny"
     exit 2
   fi
 done
