@@ -117,7 +117,7 @@ fn readings_do_not_depend_on_when_the_measurement_ran() {
     let (geometry, events) = synthesise(&scene);
     let settings = Settings::new(geometry);
     let (at_once, _) = measure_events(&events, &[], settings, Capacity::Device);
-    for (piece, steps) in [(1, u32::MAX), (16, 1), (64, 1), (128, 1), (256, 2)] {
+    for (piece, steps) in [(1, u32::MAX), (16, 1), (64, 8), (128, 16), (256, 32)] {
         let (late, overrun) = with_tachometer(settings, Capacity::Device, |tachometer| {
             let mut readings = Vec::new();
             for piece in events.chunks(piece) {
