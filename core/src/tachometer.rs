@@ -53,6 +53,9 @@ const LATEST_US: u64 = u64::MAX / 2;
 /// Standard deviation of a gyro's zero-rate offset in rad/s, with the offset calibrated on a still camera.
 const GYRO_OFFSET_RAD_S: f32 = 3e-3;
 
+/// Fastest roll that is believed, in rad/s: gyros in cameras end at 2000 degrees a second (35 rad/s).
+const FASTEST_ROLL_RAD_S: f32 = 100.0;
+
 /// A rectangle of pixels; events outside are ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Roi {
@@ -337,9 +340,10 @@ impl<'m> Tachometer<'m> {
         self.store.lost(count);
     }
 
-    /// Takes in a gyro sample.
+    /// Takes in a gyro sample. One that no gyro gives (not a number, or faster than any measures) is left out.
     pub fn gyro(&mut self, sample: GyroSample) {
-        if self.started {
+        let believed = sample.roll_rad_s.abs() <= FASTEST_ROLL_RAD_S;
+        if self.started && believed {
             self.store.roll(sample.roll_rad_s);
         }
     }

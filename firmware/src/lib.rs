@@ -6,6 +6,7 @@
 #![no_std]
 
 pub mod cost;
+pub mod instrument;
 pub mod intake;
 pub mod measure;
 pub mod record;

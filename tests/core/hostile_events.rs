@@ -202,3 +202,30 @@ fn ends_of_time() {
     at(&[(1 << 32) - 1, 1 << 32, (1 << 32) + 100_000]);
     at(&[(1 << 63) - 1, 1 << 63]);
 }
+
+/// A gyro that gives no numbers leaves a rotor's speed alone.
+#[test]
+fn a_mad_gyro_is_not_believed() {
+    let settings = Settings::new(Geometry::new(200, 200).expect("a sensor in range"));
+    for roll_rad_s in [f32::NAN, f32::INFINITY, f32::MIN, 101.0] {
+        let mut inputs = Vec::new();
+        for i in 0..60_000_u64 {
+            let angle = 60.0 * i as f64 * 5e-6 + (i % 3) as f64 * std::f64::consts::TAU / 3.0;
+            let reach = 20.0 + 6.0 * (i % 7) as f64;
+            let (x, y) =
+                ((100.0 + reach * angle.cos()) as u16, (100.0 + reach * angle.sin()) as u16);
+            inputs.push(Event { t_us: 5 * i, x, y, polarity: Polarity::On });
+        }
+        let mad = Input::Gyro(GyroSample { t_us: 0, roll_rad_s });
+        play(
+            settings,
+            &[
+                Input::Events(inputs[..30_000].to_vec()),
+                mad,
+                Input::Events(inputs[30_000..].to_vec()),
+            ],
+            16_384,
+            2_500,
+        );
+    }
+}
