@@ -14,7 +14,7 @@ use crate::registration::Icp;
 use crate::rotors::extraction::{self, Extraction, View, weigh_heat};
 use crate::rotors::{Coherence, Disc, Found, HeatMap};
 use crate::speed::measurement::{Measurement, Outcome, Stated};
-use crate::speed::polar::PolarTrack;
+use crate::speed::polar::{PolarEvent, PolarTrack};
 use crate::speed::scan::Scanner;
 use crate::store::{SPARE_SEGMENTS, Store, StoredEvent, WINDOW_SEGMENTS};
 use crate::tracker::Tracker;
@@ -110,6 +110,8 @@ pub struct Memory<'m> {
     pub heat: &'m mut [u16],
     /// Weights of the heat map's cells: as many.
     pub weights: &'m mut [u8],
+    /// Events of one rotor; the device lends [`crate::limits::POLAR_EVENTS`].
+    pub polar: &'m mut [PolarEvent],
 }
 
 /// What [`Tachometer::poll`] did.
@@ -184,7 +186,7 @@ pub struct Tachometer<'m> {
     satisfied: bool,
     ignored: Ignored,
     job: Job,
-    polar: PolarTrack,
+    polar: PolarTrack<'m>,
     scanner: Scanner,
     scratch: Scratch,
     candidates: Vec<Suspect, MAX_SUSPECTS>,
@@ -214,7 +216,7 @@ impl<'m> Tachometer<'m> {
             satisfied: false,
             ignored: Ignored::default(),
             job: Job::Idle,
-            polar: PolarTrack::new(),
+            polar: PolarTrack::new(memory.polar),
             scanner: Scanner::default(),
             scratch: Scratch::Measure(Icp::EMPTY),
             candidates: Vec::new(),

@@ -4,9 +4,11 @@ mod json;
 mod summary;
 mod table;
 
-use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
+use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS, POLAR_EVENTS};
 use evtach_core::tachometer::Ignored;
-use evtach_core::{Event, GyroSample, Memory, Poll, Reading, Settings, StoredEvent, Tachometer};
+use evtach_core::{
+    Event, GyroSample, Memory, PolarEvent, Poll, Reading, Settings, StoredEvent, Tachometer,
+};
 
 pub use json::{Document, FileFacts, ReadingRow, RotorRow, letter};
 pub use summary::{Summary, summarise};
@@ -43,6 +45,15 @@ impl Capacity {
         }
     }
 
+    /// Events of one rotor.
+    #[must_use]
+    pub const fn polar_events(self) -> usize {
+        match self {
+            Self::Device => POLAR_EVENTS,
+            Self::Full => 16 * POLAR_EVENTS,
+        }
+    }
+
     /// Cells of the heat map.
     #[must_use]
     pub const fn heat_cells(self) -> usize {
@@ -62,7 +73,13 @@ pub fn with_tachometer<R>(
     let mut events = vec![StoredEvent::default(); capacity.events()];
     let mut heat = vec![0_u16; capacity.heat_cells()];
     let mut weights = vec![0_u8; capacity.heat_cells()];
-    let memory = Memory { events: &mut events, heat: &mut heat, weights: &mut weights };
+    let mut polar = vec![PolarEvent::default(); capacity.polar_events()];
+    let memory = Memory {
+        events: &mut events,
+        heat: &mut heat,
+        weights: &mut weights,
+        polar: &mut polar,
+    };
     work(&mut Tachometer::new(settings, memory))
 }
 

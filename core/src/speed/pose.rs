@@ -1,0 +1,393 @@
+//! The rotor's pose through the window: where its axis was, and how far it had turned.
+//!
+//! The polar phase at its sharpest. The rotor is known by a template in its own frame: the phase of one high
+//! angular harmonic on each of many narrow rings, for each polarity. The window is cut into blocks of a
+//! whole part of the symmetry period; each tells by how much turn and shift its events are off the template, and these
+//! corrections, laid through the knots of a [`Path`], bring the events closer, so that the template sharpens
+//! and a higher harmonic can be followed. The trend of the turn through the blocks is the speed: all
+//! events of the track weigh in it, no slices are matched, and what the hand or the host shakes is taken out.
+//!
+//! Blocks one symmetry period apart see the same pixels (their place on the grid, their latency), so
+//! the trend gets an offset for each place in the period: what is fixed to the pixels cancels.
+
+use heapless::Vec;
+use nalgebra::{Matrix3, Vector3};
+
+use super::baseline::Estimate;
+use super::path::{Knot, Path};
+use super::polar::PolarEvent;
+use super::statistics::student_over_normal;
+use super::trend::{Point, Trend};
+use crate::limits::MAX_KNOTS;
+use crate::math::{TAU, Turn, TurnRate, sqrt};
+use crate::rotors::Disc;
+
+/// Rings between centre and rim.
+const RINGS: usize = 32;
+/// Banks: a ring for each polarity.
+const BANKS: usize = 2 * RINGS;
+/// Events that a block should hold.
+const BLOCK_EVENTS: usize = 64;
+/// Shortest block: a hand trembles up to 12 Hz, a host shakes up to some 60 Hz.
+const SHORTEST_BLOCK_US: f32 = 3_000.0;
+/// Most blocks in a symmetry period.
+const MOST_IN_PERIOD: f32 = 12.0;
+/// Symmetry periods in the window from which on places in the period get offsets of their own.
+const FOLDED_PERIODS: usize = 3;
+/// Fewest events in a block that counts.
+const LEAST_IN_BLOCK: u32 = 16;
+/// Share of the events in step below which a block is not believed.
+const LEAST_SHARE: f32 = 0.05;
+/// How far the axis is thought to be off the path, in pixels: keeps the shift of a block finite where its events lie to
+/// one side of the axis.
+const SHIFT_PRIOR_PX: f32 = 2.0;
+/// How far the path walks from knot to knot.
+const WALK_PX: f32 = 0.5;
+const WALK_RAD: f32 = 0.02;
+/// Farthest that a knot is moved at once.
+const STRIDE_PX: f32 = 3.0;
+/// Highest angular harmonic.
+const MOST_HARMONIC: u32 = 96;
+/// A doubled harmonic must keep this share of the events in step.
+const SHARP_COHERENCE: f32 = 0.35;
+/// Blocks over which the wandering of the axis is judged.
+const DRIFT_BLOCKS: usize = 12;
+/// Blocks of the path at first, and once these fit.
+const FIRST_BLOCKS: usize = 12;
+const SECOND_BLOCKS: usize = 24;
+
+/// Template of a rotor: a harmonic by ring and polarity.
+#[derive(Clone, Copy, Debug)]
+struct Template {
+    sums: [(f32, f32); BANKS],
+    counts: [u16; BANKS],
+}
+
+fn bank(event: PolarEvent, rings_per_px: f32) -> usize {
+    let ring = (event.radius_px() * rings_per_px) as usize;
+    2 * ring.min(RINGS - 1) + usize::from(event.is_on())
+}
+
+impl Template {
+    const EMPTY: Self = Self { sums: [(0.0, 0.0); BANKS], counts: [0; BANKS] };
+
+    fn add(&mut self, bank: usize, (sin, cos): (f32, f32)) {
+        self.sums[bank].0 += cos;
+        self.sums[bank].1 += sin;
+        self.counts[bank] = self.counts[bank].saturating_add(1);
+    }
+
+    /// Share of events in step, 0 to 1, corrected for what chance gives.
+    fn coherence(&self) -> f32 {
+        let (mut in_step, mut total) = (0.0, 0.0);
+        for (sum, count) in self.sums.iter().zip(self.counts) {
+            let excess = sum.0 * sum.0 + sum.1 * sum.1 - f32::from(count);
+            in_step += sqrt(excess.max(0.0));
+            total += f32::from(count);
+        }
+        in_step / total.max(1.0)
+    }
+
+    /// Every bank's phase as (cosine, sine).
+    fn phases(&self) -> [(f32, f32); BANKS] {
+        self.sums.map(|(re, im)| {
+            let length = sqrt(re * re + im * im).max(f32::MIN_POSITIVE);
+            (re / length, im / length)
+        })
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Block {
+    normal: Matrix3<f32>,
+    right: Vector3<f32>,
+    /// The same, each event by how far through the block it lies.
+    later: Vector3<f32>,
+    in_step: f32,
+    time_us: f32,
+    count: u32,
+}
+
+/// The turn followed through the window.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Slope {
+    /// Mean speed over the window.
+    pub speed: Estimate,
+    /// Acceleration in rad/s^2.
+    pub alpha_rad_s2: f32,
+    /// Its standard error in rad/s^2.
+    pub alpha_sigma_rad_s2: f32,
+    /// Root mean square speed of the axis in px/s: 0 on a tripod, tens in the hand.
+    pub drift_px_s: f32,
+}
+
+/// What is found of the pose.
+#[derive(Clone, Debug)]
+pub struct Pose {
+    disc: Disc,
+    omega_rad_s: f32,
+    window_us: f32,
+    period_us: f32,
+    harmonic: u32,
+    path: Path,
+    /// Blocks in a symmetry period, 0 when blocks are whole periods.
+    in_period: usize,
+    phases: Option<[(f32, f32); BANKS]>,
+    coherence: f32,
+    round: u8,
+}
+
+impl Pose {
+    /// Rounds until the path is as fine as it gets, and until the harmonic no longer rises.
+    pub const ROUNDS: u8 = 11;
+
+    /// A pose at rest about the disc's centre. `parts` equal parts, `harmonic` a multiple of them that is known
+    /// to keep step.
+    #[must_use]
+    pub fn new(disc: Disc, omega_rad_s: f32, parts: u32, harmonic: u32, window_us: u32) -> Self {
+        Self {
+            disc,
+            omega_rad_s,
+            window_us: window_us as f32,
+            period_us: TAU * 1e6 / (omega_rad_s.abs() * parts as f32),
+            harmonic,
+            path: Path::STILL,
+            in_period: 0,
+            phases: None,
+            coherence: 0.0,
+            round: 0,
+        }
+    }
+
+    /// Share of the events in step at the last look.
+    #[must_use]
+    pub const fn coherence(&self) -> f32 {
+        self.coherence
+    }
+
+    /// Angular harmonic at the last look.
+    #[must_use]
+    pub const fn harmonic(&self) -> u32 {
+        self.harmonic
+    }
+
+    /// The way of the axis.
+    #[must_use]
+    pub const fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The next round: corrects the path, moves the track's origin along, and learns the template anew; `true` after the
+    /// last. Cost: about 500 instructions an event.
+    pub fn step(&mut self, track: &mut [PolarEvent]) -> bool {
+        let most = track.len() / BLOCK_EVENTS;
+        match self.round {
+            0 => self.divide(most.min(FIRST_BLOCKS)),
+            3 => self.divide(most.min(SECOND_BLOCKS)),
+            4 => self.divide(most),
+            _ => {}
+        }
+        let (low, high) = if let Some(phases) = self.phases {
+            let before = self.path.clone();
+            let (blocks, low, high) = self.look(track, &phases);
+            self.correct(&blocks);
+            for event in track {
+                let t_us = event.t_us as f32;
+                let (old, new) = (before.at(t_us), self.path.at(t_us));
+                *event = event.about(new.x_px - old.x_px, new.y_px - old.y_px);
+            }
+            (low, high)
+        } else {
+            let (_, low, high) = self.look(track, &[(1.0, 0.0); BANKS]);
+            (low, high)
+        };
+        let (at_low, at_high) = (low.coherence(), high.coherence());
+        let sharper = self.round > 4
+            && 2 * self.harmonic <= MOST_HARMONIC
+            && at_high > SHARP_COHERENCE
+            && 2.0 * at_high > at_low;
+        self.harmonic *= if sharper { 2 } else { 1 };
+        self.coherence = if sharper { at_high } else { at_low };
+        self.phases = Some(if sharper { high } else { low }.phases());
+        self.round += 1;
+        self.round >= Self::ROUNDS
+    }
+
+    /// Lays the path through up to `most` blocks.
+    fn divide(&mut self, most: usize) {
+        let most = most.clamp(4, MAX_KNOTS - 1) as f32;
+        let shortest = (self.window_us / most).max(SHORTEST_BLOCK_US);
+        let split = libm::floorf((self.period_us / shortest).min(MOST_IN_PERIOD));
+        let step_us = if split >= 1.0 {
+            self.period_us / split
+        } else {
+            self.period_us * libm::ceilf(shortest / self.period_us)
+        };
+        self.in_period = split as usize;
+        let blocks = libm::ceilf(self.window_us / step_us - 0.25) as usize;
+        self.path = self.path.divided(-0.5 * self.window_us, step_us, blocks);
+    }
+
+    /// Looks at every event: how far its block is off the template, and the templates of this harmonic and of
+    /// twice it.
+    fn look(
+        &self,
+        track: &[PolarEvent],
+        phases: &[(f32, f32); BANKS],
+    ) -> ([Block; MAX_KNOTS], Template, Template) {
+        let rate = TurnRate::from_rad_s(self.omega_rad_s);
+        let rings_per_px = RINGS as f32 / self.disc.radius_px.max(1.0);
+        let m = self.harmonic as f32;
+        let mut blocks = [Block::default(); MAX_KNOTS];
+        let (mut low, mut high) = (Template::EMPTY, Template::EMPTY);
+        for event in track {
+            let t_us = event.t_us as f32;
+            let turn = Turn::from_rad(self.path.at(t_us).turn_rad).plus(rate.after(event.t_us));
+            let (s, c) = event.angle().minus(turn).times(self.harmonic).sin_cos();
+            let bank = bank(*event, rings_per_px);
+            low.add(bank, (s, c));
+            high.add(bank, (2.0 * s * c, c * c - s * s));
+            let (re, im) = phases[bank];
+            let (sin_psi, cos_psi) = (s * re - c * im, c * re + s * im);
+            let (sin, cos) = event.angle().sin_cos();
+            let lever = m / event.radius_px().max(1.0);
+            let a = Vector3::new(m, -sin * lever, cos * lever);
+            let (index, f) = self.path.place(t_us);
+            let block = &mut blocks[index];
+            block.normal.ger(1.0, &a, &a, 1.0);
+            block.right += a * sin_psi;
+            block.later += a * (sin_psi * f);
+            block.in_step += cos_psi;
+            block.time_us += t_us;
+            block.count += 1;
+        }
+        (blocks, low, high)
+    }
+
+    /// Moves the knots to where the blocks want them: least squares with a path that walks rather than jumps, a
+    /// tridiagonal system of 3 x 3 matrices, solved from end to end.
+    fn correct(&mut self, blocks: &[Block; MAX_KNOTS]) {
+        let blocks = &blocks[..self.path.blocks()];
+        let knots = self.path.knots_mut();
+        let scatter = 1.0 / (2.0 * self.coherence.max(LEAST_SHARE));
+        let (px, rad) = (scatter / (WALK_PX * WALK_PX), scatter / (WALK_RAD * WALK_RAD));
+        let stiff = Matrix3::from_diagonal(&Vector3::new(rad, px, px));
+        let step = |k: usize| -> Option<Vector3<f32>> {
+            let (a, b) = (knots.get(k)?, knots.get(k + 1)?);
+            Some(Vector3::new(b.turn_rad - a.turn_rad, b.x_px - a.x_px, b.y_px - a.y_px))
+        };
+        // Events are spread evenly within a block: a third of their weight goes to either knot, a sixth between.
+        let link = |block: &Block| block.weight() / 6.0 - stiff;
+        let mut inverses = Vec::<Matrix3<f32>, MAX_KNOTS>::new();
+        let mut sides = Vec::<Vector3<f32>, MAX_KNOTS>::new();
+        for k in 0..knots.len() {
+            let mut pivot = Matrix3::identity() * 1e-3;
+            let mut side = Vector3::zeros();
+            if let (Some(block), Some(step)) = (blocks.get(k), step(k)) {
+                pivot += block.weight() / 3.0 + stiff;
+                side += block.right - block.later + stiff * step;
+            }
+            let before = k.checked_sub(1).and_then(|i| {
+                Some((blocks.get(i)?, step(i)?, inverses.get(i)?, sides.get(i)?))
+            });
+            if let Some((block, step, inverse, before)) = before {
+                let link = link(block);
+                pivot += block.weight() / 3.0 + stiff - link * inverse * link;
+                side += block.later - stiff * step - link * (inverse * before);
+            }
+            let Some(inverse) = pivot.try_inverse() else { return };
+            inverses.push(inverse).ok();
+            sides.push(side).ok();
+        }
+        let reach_rad = 1.0 / self.harmonic as f32;
+        let within = |value: f32, reach: f32| value.max(-reach).min(reach);
+        let mut off = Vector3::zeros();
+        for (k, knot) in knots.iter_mut().enumerate().rev() {
+            let (Some(inverse), Some(side)) = (inverses.get(k), sides.get(k)) else { return };
+            off = inverse * blocks.get(k).map_or(*side, |block| side - link(block) * off);
+            if !off.iter().all(|value| value.is_finite()) {
+                return;
+            }
+            *knot = Knot {
+                x_px: knot.x_px + within(off[1], STRIDE_PX),
+                y_px: knot.y_px + within(off[2], STRIDE_PX),
+                turn_rad: knot.turn_rad + within(off[0], reach_rad),
+            };
+        }
+    }
+
+    /// The trend of the turn through the blocks, and how the axis wanders; `None` when too few blocks tell.
+    #[must_use]
+    pub fn slope(&self, track: &[PolarEvent]) -> Option<Slope> {
+        let (blocks, _, _) = self.look(track, self.phases.as_ref()?);
+        let count = self.path.blocks();
+        let periods = count / self.in_period.max(1);
+        let fold = if periods >= FOLDED_PERIODS { self.in_period.max(1) } else { 1 };
+        let half_us = 0.5 * self.window_us;
+        let mut points = Vec::<Point, MAX_KNOTS>::new();
+        for block in blocks.iter().take(count) {
+            let t_us = block.time_us / (block.count as f32).max(1.0);
+            let (off_rad, weight) = block.turn_rad().unwrap_or_default();
+            let y = self.path.at(t_us).turn_rad + off_rad;
+            points.push(Point { u: t_us / half_us, y, weight }).ok();
+        }
+        let trend = Trend::fit(&points, fold)?;
+        let factor = student_over_normal(trend.degrees_of_freedom);
+        let half_s = half_us * 1e-6;
+        Some(Slope {
+            speed: Estimate {
+                omega_rad_s: self.omega_rad_s + trend.slope / half_s,
+                sigma_rad_s: factor * trend.slope_error / half_s,
+            },
+            alpha_rad_s2: trend.bend / (half_s * half_s),
+            alpha_sigma_rad_s2: factor * trend.bend_error / (half_s * half_s),
+            drift_px_s: self.drift_px_s(),
+        })
+    }
+
+    fn drift_px_s(&self) -> f32 {
+        let size = self.path.blocks().div_ceil(DRIFT_BLOCKS).max(1);
+        let dt_s = size as f32 * self.path.step_us() * 1e-6;
+        let mean = |knots: &[Knot]| {
+            let n = knots.len() as f32;
+            let sum = |part: fn(&Knot) -> f32| knots.iter().map(part).sum::<f32>() / n;
+            (sum(|knot| knot.x_px), sum(|knot| knot.y_px))
+        };
+        let (mut squares, mut count, mut before) = (0.0, 0_u8, None);
+        for knots in self.path.knots().chunks_exact(size) {
+            let here = mean(knots);
+            if let Some((x, y)) = before {
+                let (vx, vy) = ((here.0 - x) / dt_s, (here.1 - y) / dt_s);
+                squares += vx * vx + vy * vy;
+                count += 1;
+            }
+            before = Some(here);
+        }
+        sqrt(squares / f32::from(count.max(1)))
+    }
+}
+
+impl Block {
+    fn share(&self) -> f32 {
+        self.in_step / (self.count as f32).max(1.0)
+    }
+
+    /// What the block knows about turn and shift.
+    fn weight(&self) -> Matrix3<f32> {
+        self.normal * self.share().max(LEAST_SHARE)
+    }
+
+    /// Turn in radians by which the block as a whole is off, and its weight.
+    fn turn_rad(&self) -> Option<(f32, f32)> {
+        let share = self.share();
+        if self.count < LEAST_IN_BLOCK || share <= LEAST_SHARE {
+            return None;
+        }
+        // Events scatter by about 1 / (2 share) in phase squared, which gives the prior its weight.
+        let prior = 1.0 / (2.0 * share * SHIFT_PRIOR_PX * SHIFT_PRIOR_PX);
+        let damped =
+            self.normal * share + Matrix3::from_diagonal(&Vector3::new(0.0, prior, prior));
+        let off_rad = damped.cholesky()?.solve(&self.right)[0];
+        off_rad.is_finite().then_some((off_rad, self.count as f32))
+    }
+}
