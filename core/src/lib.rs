@@ -16,6 +16,5 @@ pub mod tracker;
 
 pub use event::{Event, Geometry, GyroSample, Polarity};
 pub use reading::{Direction, Evidence, Frame, Reading, Reason, RotorReading, Speed, Status};
-pub use speed::polar::PolarEvent;
 pub use store::StoredEvent;
 pub use tachometer::{Ignored, Memory, Poll, Roi, Settings, Tachometer};

@@ -10,11 +10,10 @@ use heapless::Vec;
 use crate::event::{Event, Geometry, GyroSample};
 use crate::limits::{MAX_ROTORS, MAX_SUSPECTS};
 use crate::reading::{Evidence, Frame, Reading, Reason, RotorReading, Status};
-use crate::registration::Icp;
 use crate::rotors::extraction::{self, Extraction, View, weigh_heat};
 use crate::rotors::{Coherence, Disc, Found, HeatMap};
-use crate::speed::measurement::{Measurement, Outcome, Stated};
-use crate::speed::polar::{PolarEvent, PolarTrack};
+use crate::speed::measurement::{Bench, Measurement, Outcome, Stated};
+use crate::speed::polar::PolarTrack;
 use crate::speed::scan::Scanner;
 use crate::store::{SPARE_SEGMENTS, Store, StoredEvent, WINDOW_SEGMENTS};
 use crate::tracker::Tracker;
@@ -110,8 +109,6 @@ pub struct Memory<'m> {
     pub heat: &'m mut [u16],
     /// Weights of the heat map's cells: as many.
     pub weights: &'m mut [u8],
-    /// Events of one rotor; the device lends [`crate::limits::POLAR_EVENTS`].
-    pub polar: &'m mut [PolarEvent],
 }
 
 /// What [`Tachometer::poll`] did.
@@ -163,7 +160,7 @@ struct Suspect {
 #[expect(clippy::large_enum_variant, reason = "the larger one is the point: both share its memory")]
 enum Scratch {
     Search(extraction::Scratch),
-    Measure(Icp),
+    Measure(Bench),
 }
 
 /// Events in, readings out.
@@ -186,7 +183,7 @@ pub struct Tachometer<'m> {
     satisfied: bool,
     ignored: Ignored,
     job: Job,
-    polar: PolarTrack<'m>,
+    polar: PolarTrack,
     scanner: Scanner,
     scratch: Scratch,
     candidates: Vec<Suspect, MAX_SUSPECTS>,
@@ -216,9 +213,9 @@ impl<'m> Tachometer<'m> {
             satisfied: false,
             ignored: Ignored::default(),
             job: Job::Idle,
-            polar: PolarTrack::new(memory.polar),
+            polar: PolarTrack::new(),
             scanner: Scanner::default(),
-            scratch: Scratch::Measure(Icp::EMPTY),
+            scratch: Scratch::Measure(Bench::EMPTY),
             candidates: Vec::new(),
             outcomes: Vec::new(),
             in_step_hz: None,
@@ -421,12 +418,12 @@ impl<'m> Tachometer<'m> {
                 false
             }
             Job::Measure(index, measurement) => {
-                let Scratch::Measure(icp) = &mut self.scratch else { return true };
+                let Scratch::Measure(bench) = &mut self.scratch else { return true };
                 let stated = Stated {
                     blades: self.settings.blades,
                     clock_sigma_ppm: self.settings.clock_sigma_ppm,
                 };
-                if !measurement.step(&window, &stated, &mut self.polar, icp) {
+                if !measurement.step(&window, &stated, &mut self.polar, bench) {
                     return false;
                 }
                 let (index, outcome) = (*index, measurement.result());
@@ -478,7 +475,7 @@ impl<'m> Tachometer<'m> {
             return true;
         };
         if !matches!(self.scratch, Scratch::Measure(_)) {
-            self.scratch = Scratch::Measure(Icp::EMPTY);
+            self.scratch = Scratch::Measure(Bench::EMPTY);
         }
         let Suspect { found, followed } = self.candidates[next];
         let measurement = match followed {

@@ -19,7 +19,7 @@ use super::kmeans::{Cluster, KMeans, Seeding, davies_bouldin, nearest};
 use super::winding::{Explainer, Winding};
 use crate::limits::{COHERENCE_CELLS, MAX_CANDIDATES, MAX_CLUSTERS, MAX_LINES};
 use crate::math::{TAU, sqrt};
-use crate::speed::polar::PolarTrack;
+use crate::speed::polar::{PolarTrack, track};
 use crate::speed::scan::{Peak, Scanner};
 use crate::store::Window;
 
@@ -167,7 +167,7 @@ impl Extraction {
     pub fn step(
         &mut self,
         view: &View<'_>,
-        track: &mut PolarTrack<'_>,
+        track: &mut PolarTrack,
         scanner: &mut Scanner,
         scratch: &mut Scratch,
     ) -> bool {
@@ -222,7 +222,7 @@ impl Extraction {
         self.in_step_hz
     }
 
-    fn start_tile(&mut self, view: &View<'_>, polar: &mut PolarTrack<'_>, scanner: &mut Scanner) {
+    fn start_tile(&mut self, view: &View<'_>, polar: &mut PolarTrack, scanner: &mut Scanner) {
         scanner.restart();
         polar.clear();
         let tile = without_outliers(self.cells(view), self.kmeans.clusters(), self.tile);
@@ -231,7 +231,7 @@ impl Extraction {
             // Seen from beside its centre: about the centre of n blades all harmonics but n and its multiples are
             // silent, and n may be higher than what is looked at.
             let beside = Disc { x_px: x_px + BESIDE * radius_px, y_px, radius_px };
-            polar.sample(&view.window, beside);
+            track(&view.window, beside, polar);
         }
     }
 
@@ -242,7 +242,7 @@ impl Extraction {
         Cells { grid: view.grid, weights: view.weights, floor }
     }
 
-    fn spectrum(&mut self, view: &View<'_>, track: &mut PolarTrack<'_>, scanner: &mut Scanner) {
+    fn spectrum(&mut self, view: &View<'_>, track: &mut PolarTrack, scanner: &mut Scanner) {
         if self.tile >= self.kmeans.clusters().len() {
             self.pass += 1;
             self.stage = if self.pass < PASSES { Stage::Seed } else { Stage::Map };

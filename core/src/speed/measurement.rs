@@ -5,8 +5,8 @@ mod verdict;
 use super::baseline::{Estimate, Pace, Pairs};
 use super::initial::{Ladder, Rates, median};
 use super::phase::{Pattern, harmonics, newton};
-use super::polar::{PolarEvent, PolarTrack};
-use super::pose::Pose;
+use super::polar::{PolarEvent, PolarTrack, track};
+use super::pose::{Pose, Sums};
 use super::statistics::mean_and_error;
 use super::symmetry::symmetry;
 use crate::math::TAU;
@@ -83,6 +83,18 @@ enum Stage {
     Fractional,
     Verdict,
     Done,
+}
+
+/// Memory that the stages work in.
+#[derive(Debug)]
+pub struct Bench {
+    icp: Icp,
+    sums: Sums,
+}
+
+impl Bench {
+    /// Nothing on it. A constant, so that it is copied into place instead of being built on the stack.
+    pub const EMPTY: Self = Self { icp: Icp::EMPTY, sums: Sums::EMPTY };
 }
 
 /// The measurement of one rotor.
@@ -172,14 +184,15 @@ impl Measurement {
         &mut self,
         window: &Window<'_>,
         stated: &Stated,
-        polar: &mut PolarTrack<'_>,
-        icp: &mut Icp,
+        polar: &mut PolarTrack,
+        bench: &mut Bench,
     ) -> bool {
+        let Bench { icp, sums } = bench;
         match self.stage {
             Stage::Newton => self.newton(window, polar),
             Stage::Scan => self.scan(polar),
             Stage::Symmetry => self.symmetry(stated, polar),
-            Stage::Pose => self.pose(window, polar),
+            Stage::Pose => self.pose(window, sums),
             Stage::Initial => self.initial(window, icp),
             Stage::Refinement => self.refinement(window, icp),
             Stage::Further => self.further(window, icp),
@@ -218,9 +231,9 @@ impl Measurement {
     }
 
     /// Centre and speed by the polar phase, a Newton step at a time.
-    fn newton(&mut self, window: &Window<'_>, polar: &mut PolarTrack<'_>) {
+    fn newton(&mut self, window: &Window<'_>, polar: &mut PolarTrack) {
         if self.turn == 0 {
-            self.events = polar.sample(window, self.disc);
+            self.events = track(window, self.disc, polar);
         }
         self.evidence.events = self.events as u32;
         if self.events < LEAST_EVENTS {
@@ -299,24 +312,23 @@ impl Measurement {
     }
 
     /// Follows the rotor's pose through the window, a round at a time: second witness of the lock.
-    fn pose(&mut self, window: &Window<'_>, polar: &mut PolarTrack<'_>) {
+    fn pose(&mut self, window: &Window<'_>, sums: &mut Sums) {
         if self.turn == 0 {
             self.turn = 1;
-            self.events = polar.take_all(window, self.disc);
-            self.evidence.events = self.events as u32;
-            if self.events < LEAST_EVENTS {
-                return self.refuse(Reason::TooFewEvents);
-            }
             let parts = if self.alike { u32::from(self.parts.unwrap_or(1)).max(1) } else { 1 };
             self.pose =
                 Pose::new(self.disc, self.omega_rad_s, parts, self.harmonic, window.duration_us);
-            return;
         }
-        if !self.pose.step(polar) {
+        if !self.pose.step(window, sums) {
             return;
         }
         self.turn = 0;
-        if let Some(found) = self.pose.slope(polar) {
+        self.events = self.pose.events();
+        self.evidence.events = self.events as u32;
+        if self.events < LEAST_EVENTS {
+            return self.refuse(Reason::TooFewEvents);
+        }
+        if let Some(found) = self.pose.slope() {
             self.evidence.phase_rad_s = Some(found.speed.omega_rad_s);
             self.evidence.phase_sigma_rad_s = Some(found.speed.sigma_rad_s);
             self.drift_px_s = found.drift_px_s;
@@ -338,7 +350,7 @@ impl Measurement {
     }
 
     /// One Newton step of centre and speed; `false` when the phase gives none.
-    fn step_centre(&mut self, window: &Window<'_>, polar: &mut PolarTrack<'_>) -> bool {
+    fn step_centre(&mut self, window: &Window<'_>, polar: &mut PolarTrack) -> bool {
         let found = newton(polar, self.disc, self.omega_rad_s, self.harmonic, window.duration_us);
         let Some(step) = found else { return false };
         let reach_px = 0.3 * self.disc.radius_px;
@@ -346,7 +358,7 @@ impl Measurement {
         self.disc.x_px += step.dx_px.max(-reach_px).min(reach_px);
         self.disc.y_px += step.dy_px.max(-reach_px).min(reach_px);
         self.omega_rad_s += step.domega_rad_s;
-        self.events = polar.sample(window, self.disc);
+        self.events = track(window, self.disc, polar);
         true
     }
 

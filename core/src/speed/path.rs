@@ -108,7 +108,13 @@ impl<'p> Moving<'p> {
     /// Position relative to the axis, and its squared length, when the event lies in the disc's annulus.
     #[must_use]
     pub fn place(&self, event: StoredEvent) -> Option<(f32, f32, f32)> {
-        let knot = self.path.at((event.since(self.start_us) - self.middle_us) as f32);
+        let knot = self.path.at(self.since_middle_us(event) as f32);
         self.annulus.place_from(event, (knot.x_px, knot.y_px))
+    }
+
+    /// Time since the middle of the window in microseconds.
+    #[must_use]
+    pub const fn since_middle_us(&self, event: StoredEvent) -> i32 {
+        event.since(self.start_us) - self.middle_us
     }
 }

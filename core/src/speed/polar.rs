@@ -1,6 +1,6 @@
 //! Events of one rotor in polar coordinates about its centre.
 
-use core::ops::{Deref, DerefMut};
+use heapless::Vec;
 
 use crate::limits::POLAR_EVENTS;
 use crate::math::{Turn, sqrt};
@@ -77,17 +77,6 @@ impl PolarEvent {
         self.radius_polarity & 0x8000 != 0
     }
 
-    /// The event as seen from a centre that lies (dx, dy) pixels from this one.
-    #[must_use]
-    pub fn about(self, dx_px: f32, dy_px: f32) -> Self {
-        let (sin, cos) = self.angle().sin_cos();
-        let r = self.radius_px();
-        let (x, y) = (r * cos - dx_px, r * sin - dy_px);
-        let angle = (Turn::of_vector(y, x).0 >> 16) as u16;
-        let radius = ((sqrt(x * x + y * y) * 16.0) as u16).min(0x7FFF);
-        Self { angle, radius_polarity: radius | self.radius_polarity & 0x8000, ..self }
-    }
-
     /// Converts one event; `mid_us` is the middle of the window since its start.
     fn new(event: StoredEvent, place: (f32, f32, f32), start_us: u64, mid_us: i32) -> Self {
         let (dx, dy, r2) = place;
@@ -98,74 +87,18 @@ impl PolarEvent {
     }
 }
 
-/// A rotor's events in the memory that the caller lends.
-#[derive(Debug)]
-pub struct PolarTrack<'m> {
-    memory: &'m mut [PolarEvent],
-    len: usize,
-}
+/// A rotor's events, evenly thinned to the capacity.
+pub type PolarTrack = Vec<PolarEvent, POLAR_EVENTS>;
 
-impl<'m> PolarTrack<'m> {
-    /// An empty track.
-    pub const fn new(memory: &'m mut [PolarEvent]) -> Self {
-        Self { memory, len: 0 }
+/// Fills `track` with the rotor's events of the window and returns how many there were before thinning.
+/// Cost: about 200 instructions for each event in the annulus.
+pub fn track(window: &Window<'_>, disc: Disc, track: &mut PolarTrack) -> usize {
+    track.clear();
+    let annulus = Annulus::of(disc);
+    let mid_us = (window.duration_us / 2) as i32;
+    let (total, even) = window.even(POLAR_EVENTS, |event| annulus.place(event));
+    for (event, place) in even {
+        track.push(PolarEvent::new(event, place, window.start_us, mid_us)).ok();
     }
-
-    /// Forgets the events.
-    pub const fn clear(&mut self) {
-        self.len = 0;
-    }
-
-    fn fill(&mut self, events: impl Iterator<Item = PolarEvent>) {
-        self.len = 0;
-        for (place, event) in self.memory.iter_mut().zip(events) {
-            *place = event;
-            self.len += 1;
-        }
-    }
-
-    /// Takes the rotor's events of the window, evenly thinned to at most [`POLAR_EVENTS`], and returns how many there
-    /// were before. Cost: about 200 instructions for each event in the annulus.
-    pub fn sample(&mut self, window: &Window<'_>, disc: Disc) -> usize {
-        let annulus = Annulus::of(disc);
-        let mid_us = (window.duration_us / 2) as i32;
-        let (total, even) = window.even(POLAR_EVENTS, |event| annulus.place(event));
-        self.fill(even.map(|(event, place)| PolarEvent::new(event, place, window.start_us, mid_us)));
-        total
-    }
-
-    /// Takes as many of the rotor's events of the window as the memory holds: not evenly through time, as the
-    /// store is denser at the start of each segment. Returns and costs the same as [`Self::sample`].
-    pub fn take_all(&mut self, window: &Window<'_>, disc: Disc) -> usize {
-        let annulus = Annulus::of(disc);
-        let mid_us = (window.duration_us / 2) as i32;
-        let placed = || window.events().filter_map(|event| Some((event, annulus.place(event)?)));
-        let (total, room) = (placed().count(), self.memory.len());
-        let mut next = 0;
-        let thinned = placed().enumerate().filter(|(index, _)| {
-            let kept = index * room >= next;
-            if kept {
-                next += total.max(room);
-            }
-            kept
-        });
-        self.fill(thinned.map(|(_, (event, place))| {
-            PolarEvent::new(event, place, window.start_us, mid_us)
-        }));
-        total
-    }
-}
-
-impl Deref for PolarTrack<'_> {
-    type Target = [PolarEvent];
-
-    fn deref(&self) -> &[PolarEvent] {
-        &self.memory[..self.len]
-    }
-}
-
-impl DerefMut for PolarTrack<'_> {
-    fn deref_mut(&mut self) -> &mut [PolarEvent] {
-        &mut self.memory[..self.len]
-    }
+    total
 }

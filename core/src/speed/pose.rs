@@ -14,13 +14,13 @@ use heapless::Vec;
 use nalgebra::{Matrix3, Vector3};
 
 use super::baseline::Estimate;
-use super::path::{Knot, Path};
-use super::polar::PolarEvent;
+use super::path::{Knot, Moving, Path};
 use super::statistics::student_over_normal;
 use super::trend::{Point, Trend};
 use crate::limits::MAX_KNOTS;
 use crate::math::{TAU, Turn, TurnRate, sqrt};
 use crate::rotors::Disc;
+use crate::store::Window;
 
 /// Rings between centre and rim.
 const RINGS: usize = 32;
@@ -55,17 +55,20 @@ const DRIFT_BLOCKS: usize = 12;
 /// Blocks of the path at first, and once these fit.
 const FIRST_BLOCKS: usize = 12;
 const SECOND_BLOCKS: usize = 24;
+/// Rounds from which on the path has more blocks, as many as the events allow, all events count, and the last.
+const SECOND_ROUND: u8 = 4;
+const FINE_ROUND: u8 = 5;
+const ALL_ROUND: u8 = 10;
+const LAST_ROUND: u8 = 11;
+/// Events looked at before, and after.
+const FIRST_EVENTS: usize = 3_072;
+const MOST_EVENTS: usize = 65_536;
 
 /// Template of a rotor: a harmonic by ring and polarity.
 #[derive(Clone, Copy, Debug)]
 struct Template {
     sums: [(f32, f32); BANKS],
     counts: [u16; BANKS],
-}
-
-fn bank(event: PolarEvent, rings_per_px: f32) -> usize {
-    let ring = (event.radius_px() * rings_per_px) as usize;
-    2 * ring.min(RINGS - 1) + usize::from(event.is_on())
 }
 
 impl Template {
@@ -97,9 +100,10 @@ impl Template {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Block {
-    normal: Matrix3<f32>,
+    /// Sums of the products of m, -l sin and l cos, with m the harmonic and l = m / r.
+    normal: [f32; 6],
     right: Vector3<f32>,
     /// The same, each event by how far through the block it lies.
     later: Vector3<f32>,
@@ -121,6 +125,26 @@ pub struct Slope {
     pub drift_px_s: f32,
 }
 
+/// Sums of one round.
+#[derive(Clone, Debug)]
+pub struct Sums {
+    blocks: [Block; MAX_KNOTS],
+    low: Template,
+    high: Template,
+    /// Events of the rotor so far, those looked at among them.
+    index: usize,
+}
+
+impl Sums {
+    /// Nothing looked at. A constant, so that it is copied into place instead of being built on the stack.
+    pub const EMPTY: Self = Self {
+        blocks: [Block::EMPTY; MAX_KNOTS],
+        low: Template::EMPTY,
+        high: Template::EMPTY,
+        index: 0,
+    };
+}
+
 /// What is found of the pose.
 #[derive(Clone, Debug)]
 pub struct Pose {
@@ -134,17 +158,19 @@ pub struct Pose {
     in_period: usize,
     phases: Option<[(f32, f32); BANKS]>,
     coherence: f32,
+    /// Rotor's events in the window.
+    events: usize,
     round: u8,
+    /// Segment of the window that is looked at next.
+    segment: usize,
+    slope: Option<Slope>,
 }
 
 impl Pose {
-    /// Rounds until the path is as fine as it gets, and until the harmonic no longer rises.
-    pub const ROUNDS: u8 = 11;
-
     /// A pose at rest about the disc's centre. `parts` equal parts, `harmonic` a multiple of them that is known
     /// to keep step.
     #[must_use]
-    pub fn new(disc: Disc, omega_rad_s: f32, parts: u32, harmonic: u32, window_us: u32) -> Self {
+    pub const fn new(disc: Disc, omega_rad_s: f32, parts: u32, harmonic: u32, window_us: u32) -> Self {
         Self {
             disc,
             omega_rad_s,
@@ -155,7 +181,10 @@ impl Pose {
             in_period: 0,
             phases: None,
             coherence: 0.0,
+            events: 0,
             round: 0,
+            segment: 0,
+            slope: None,
         }
     }
 
@@ -165,10 +194,10 @@ impl Pose {
         self.coherence
     }
 
-    /// Angular harmonic at the last look.
+    /// Rotor's events in the window.
     #[must_use]
-    pub const fn harmonic(&self) -> u32 {
-        self.harmonic
+    pub const fn events(&self) -> usize {
+        self.events
     }
 
     /// The way of the axis.
@@ -177,40 +206,58 @@ impl Pose {
         &self.path
     }
 
-    /// The next round: corrects the path, moves the track's origin along, and learns the template anew; `true` after the
-    /// last. Cost: about 500 instructions an event.
-    pub fn step(&mut self, track: &mut [PolarEvent]) -> bool {
-        let most = track.len() / BLOCK_EVENTS;
-        match self.round {
-            0 => self.divide(most.min(FIRST_BLOCKS)),
-            3 => self.divide(most.min(SECOND_BLOCKS)),
-            4 => self.divide(most),
-            _ => {}
+    /// The trend of the turn, once all rounds are done; `None` when too few blocks tell.
+    #[must_use]
+    pub const fn slope(&self) -> Option<&Slope> {
+        self.slope.as_ref()
+    }
+
+    /// Looks at one more segment of the window, and where that ends a round corrects the path and learns the
+    /// template anew; `true` once all rounds are done. Cost: about 400 instructions an event.
+    pub fn step(&mut self, window: &Window<'_>, sums: &mut Sums) -> bool {
+        if self.round == 0 {
+            let disc = Moving::new(self.disc, &self.path, window);
+            self.events = window.events().filter(|event| disc.place(*event).is_some()).count();
+            self.divide(self.seen(FIRST_EVENTS).min(FIRST_BLOCKS));
+            self.round = 1;
         }
-        let (low, high) = if let Some(phases) = self.phases {
-            let before = self.path.clone();
-            let (blocks, low, high) = self.look(track, &phases);
-            self.correct(&blocks);
-            for event in track {
-                let t_us = event.t_us as f32;
-                let (old, new) = (before.at(t_us), self.path.at(t_us));
-                *event = event.about(new.x_px - old.x_px, new.y_px - old.y_px);
-            }
-            (low, high)
-        } else {
-            let (_, low, high) = self.look(track, &[(1.0, 0.0); BANKS]);
-            (low, high)
-        };
-        let (at_low, at_high) = (low.coherence(), high.coherence());
-        let sharper = self.round > 4
+        if self.segment == 0 {
+            *sums = Sums::EMPTY;
+        }
+        self.look(window, sums);
+        self.segment += 1;
+        if self.segment < window.segments() {
+            return false;
+        }
+        self.segment = 0;
+        if self.round > LAST_ROUND {
+            self.slope = self.trend(sums);
+            return true;
+        }
+        let (at_low, at_high) = (sums.low.coherence(), sums.high.coherence());
+        if self.round > 1 {
+            self.correct(&sums.blocks);
+        }
+        let sharper = self.round > FINE_ROUND
             && 2 * self.harmonic <= MOST_HARMONIC
             && at_high > SHARP_COHERENCE
             && 2.0 * at_high > at_low;
         self.harmonic *= if sharper { 2 } else { 1 };
         self.coherence = if sharper { at_high } else { at_low };
-        self.phases = Some(if sharper { high } else { low }.phases());
+        self.phases = Some(if sharper { &sums.high } else { &sums.low }.phases());
         self.round += 1;
-        self.round >= Self::ROUNDS
+        match self.round {
+            SECOND_ROUND => self.divide(self.seen(FIRST_EVENTS).min(SECOND_BLOCKS)),
+            FINE_ROUND => self.divide(self.seen(FIRST_EVENTS)),
+            ALL_ROUND => self.divide(self.seen(MOST_EVENTS)),
+            _ => {}
+        }
+        false
+    }
+
+    /// Blocks that so many events are enough for.
+    fn seen(&self, most: usize) -> usize {
+        self.events.min(most) / BLOCK_EVENTS
     }
 
     /// Lays the path through up to `most` blocks.
@@ -228,40 +275,42 @@ impl Pose {
         self.path = self.path.divided(-0.5 * self.window_us, step_us, blocks);
     }
 
-    /// Looks at every event: how far its block is off the template, and the templates of this harmonic and of
-    /// twice it.
-    fn look(
-        &self,
-        track: &[PolarEvent],
-        phases: &[(f32, f32); BANKS],
-    ) -> ([Block; MAX_KNOTS], Template, Template) {
+    /// Looks at the events of a segment: how far the blocks are off the template, and the templates of this harmonic
+    /// and of twice it. Early rounds look at some events only.
+    fn look(&self, window: &Window<'_>, sums: &mut Sums) {
+        let most = if self.round < ALL_ROUND { FIRST_EVENTS } else { MOST_EVENTS };
+        let stride = self.events.div_ceil(most).max(1);
+        let disc = Moving::new(self.disc, &self.path, window);
         let rate = TurnRate::from_rad_s(self.omega_rad_s);
         let rings_per_px = RINGS as f32 / self.disc.radius_px.max(1.0);
         let m = self.harmonic as f32;
-        let mut blocks = [Block::default(); MAX_KNOTS];
-        let (mut low, mut high) = (Template::EMPTY, Template::EMPTY);
-        for event in track {
-            let t_us = event.t_us as f32;
-            let turn = Turn::from_rad(self.path.at(t_us).turn_rad).plus(rate.after(event.t_us));
-            let (s, c) = event.angle().minus(turn).times(self.harmonic).sin_cos();
-            let bank = bank(*event, rings_per_px);
-            low.add(bank, (s, c));
-            high.add(bank, (2.0 * s * c, c * c - s * s));
+        let phases = self.phases.as_ref();
+        for event in window.segment(self.segment) {
+            let Some((x_px, y_px, r2)) = disc.place(*event) else { continue };
+            sums.index += 1;
+            if sums.index % stride != 0 {
+                continue;
+            }
+            let t_us = disc.since_middle_us(*event);
+            let turn = Turn::from_rad(self.path.at(t_us as f32).turn_rad).plus(rate.after(t_us));
+            let angle = Turn::of_vector(y_px, x_px);
+            let (s, c) = angle.minus(turn).times(self.harmonic).sin_cos();
+            let radius_px = sqrt(r2);
+            let ring = ((radius_px * rings_per_px) as usize).min(RINGS - 1);
+            let bank = 2 * ring + usize::from(event.is_on());
+            sums.low.add(bank, (s, c));
+            sums.high.add(bank, (2.0 * s * c, c * c - s * s));
+            let Some(phases) = phases else { continue };
             let (re, im) = phases[bank];
             let (sin_psi, cos_psi) = (s * re - c * im, c * re + s * im);
-            let (sin, cos) = event.angle().sin_cos();
-            let lever = m / event.radius_px().max(1.0);
-            let a = Vector3::new(m, -sin * lever, cos * lever);
-            let (index, f) = self.path.place(t_us);
-            let block = &mut blocks[index];
-            block.normal.ger(1.0, &a, &a, 1.0);
-            block.right += a * sin_psi;
-            block.later += a * (sin_psi * f);
-            block.in_step += cos_psi;
-            block.time_us += t_us;
-            block.count += 1;
+            let lever = m / r2;
+            let (index, f) = self.path.place(t_us as f32);
+            sums.blocks[index].add(
+                Vector3::new(m, -y_px * lever, x_px * lever),
+                (sin_psi, cos_psi),
+                (t_us as f32, f),
+            );
         }
-        (blocks, low, high)
     }
 
     /// Moves the knots to where the blocks want them: least squares with a path that walks rather than jumps, a
@@ -317,15 +366,13 @@ impl Pose {
     }
 
     /// The trend of the turn through the blocks, and how the axis wanders; `None` when too few blocks tell.
-    #[must_use]
-    pub fn slope(&self, track: &[PolarEvent]) -> Option<Slope> {
-        let (blocks, _, _) = self.look(track, self.phases.as_ref()?);
+    fn trend(&self, sums: &Sums) -> Option<Slope> {
         let count = self.path.blocks();
         let periods = count / self.in_period.max(1);
         let fold = if periods >= FOLDED_PERIODS { self.in_period.max(1) } else { 1 };
         let half_us = 0.5 * self.window_us;
         let mut points = Vec::<Point, MAX_KNOTS>::new();
-        for block in blocks.iter().take(count) {
+        for block in sums.blocks.iter().take(count) {
             let t_us = block.time_us / (block.count as f32).max(1.0);
             let (off_rad, weight) = block.turn_rad().unwrap_or_default();
             let y = self.path.at(t_us).turn_rad + off_rad;
@@ -372,9 +419,34 @@ impl Block {
         self.in_step / (self.count as f32).max(1.0)
     }
 
+    const EMPTY: Self = Self {
+        normal: [0.0; 6],
+        right: Vector3::new(0.0, 0.0, 0.0),
+        later: Vector3::new(0.0, 0.0, 0.0),
+        in_step: 0.0,
+        time_us: 0.0,
+        count: 0,
+    };
+
+    /// Adds an event: its levers on phase by turn and shift, its phase off the template, and when it came.
+    fn add(&mut self, a: Vector3<f32>, (sin_psi, cos_psi): (f32, f32), (t_us, f): (f32, f32)) {
+        let products = [a.x * a.x, a.x * a.y, a.x * a.z, a.y * a.y, a.y * a.z, a.z * a.z];
+        self.normal.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
+        self.right += a * sin_psi;
+        self.later += a * (sin_psi * f);
+        self.in_step += cos_psi;
+        self.time_us += t_us;
+        self.count += 1;
+    }
+
+    fn normal(&self) -> Matrix3<f32> {
+        let [a, b, c, d, e, f] = self.normal;
+        Matrix3::new(a, b, c, b, d, e, c, e, f)
+    }
+
     /// What the block knows about turn and shift.
     fn weight(&self) -> Matrix3<f32> {
-        self.normal * self.share().max(LEAST_SHARE)
+        self.normal() * self.share().max(LEAST_SHARE)
     }
 
     /// Turn in radians by which the block as a whole is off, and its weight.
@@ -386,7 +458,7 @@ impl Block {
         // Events scatter by about 1 / (2 share) in phase squared, which gives the prior its weight.
         let prior = 1.0 / (2.0 * share * SHIFT_PRIOR_PX * SHIFT_PRIOR_PX);
         let damped =
-            self.normal * share + Matrix3::from_diagonal(&Vector3::new(0.0, prior, prior));
+            self.normal() * share + Matrix3::from_diagonal(&Vector3::new(0.0, prior, prior));
         let off_rad = damped.cholesky()?.solve(&self.right)[0];
         off_rad.is_finite().then_some((off_rad, self.count as f32))
     }

@@ -9,7 +9,7 @@
 use heapless::Vec;
 use microfft::Complex32;
 
-use super::polar::PolarEvent;
+use super::polar::PolarTrack;
 use crate::limits::SCAN_BINS;
 use crate::math::Turn;
 
@@ -59,7 +59,7 @@ impl Scanner {
 
     /// Scans the next harmonic; `true` once all are scanned.
     /// Cost: about 60 instructions an event and 150 000 for the transform.
-    pub fn step(&mut self, track: &[PolarEvent], window_us: u32) -> bool {
+    pub fn step(&mut self, track: &PolarTrack, window_us: u32) -> bool {
         self.harmonic += 1;
         let harmonic = self.harmonic;
         self.spectrum.fill(Complex32::new(0.0, 0.0));

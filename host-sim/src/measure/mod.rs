@@ -4,11 +4,9 @@ mod json;
 mod summary;
 mod table;
 
-use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS, POLAR_EVENTS};
+use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
 use evtach_core::tachometer::Ignored;
-use evtach_core::{
-    Event, GyroSample, Memory, PolarEvent, Poll, Reading, Settings, StoredEvent, Tachometer,
-};
+use evtach_core::{Event, GyroSample, Memory, Poll, Reading, Settings, StoredEvent, Tachometer};
 
 pub use json::{Document, FileFacts, ReadingRow, RotorRow, letter};
 pub use summary::{Summary, summarise};
@@ -45,15 +43,6 @@ impl Capacity {
         }
     }
 
-    /// Events of one rotor.
-    #[must_use]
-    pub const fn polar_events(self) -> usize {
-        match self {
-            Self::Device => POLAR_EVENTS,
-            Self::Full => 16 * POLAR_EVENTS,
-        }
-    }
-
     /// Cells of the heat map.
     #[must_use]
     pub const fn heat_cells(self) -> usize {
@@ -73,13 +62,7 @@ pub fn with_tachometer<R>(
     let mut events = vec![StoredEvent::default(); capacity.events()];
     let mut heat = vec![0_u16; capacity.heat_cells()];
     let mut weights = vec![0_u8; capacity.heat_cells()];
-    let mut polar = vec![PolarEvent::default(); capacity.polar_events()];
-    let memory = Memory {
-        events: &mut events,
-        heat: &mut heat,
-        weights: &mut weights,
-        polar: &mut polar,
-    };
+    let memory = Memory { events: &mut events, heat: &mut heat, weights: &mut weights };
     work(&mut Tachometer::new(settings, memory))
 }
 
