@@ -36,7 +36,8 @@ const MOST_IN_PERIOD: f32 = 12.0;
 const FOLDED_PERIODS: usize = 3;
 /// Fewest events in a block that counts.
 const LEAST_IN_BLOCK: u32 = 16;
-/// Share of the events in step below which a block is not believed.
+/// Share of a block's events in step, over that of all, below which the block is not believed, and the least.
+const BLOCK_SHARE: f32 = 0.4;
 const LEAST_SHARE: f32 = 0.05;
 /// How far the axis is thought to be off the path, in pixels: keeps the shift of a block finite where its events lie to
 /// one side of the axis.
@@ -59,7 +60,7 @@ const SECOND_BLOCKS: usize = 24;
 const SECOND_ROUND: u8 = 4;
 const FINE_ROUND: u8 = 5;
 const ALL_ROUND: u8 = 10;
-const LAST_ROUND: u8 = 11;
+const LAST_ROUND: u8 = 13;
 /// Events looked at before, and after.
 const FIRST_EVENTS: usize = 3_072;
 const MOST_EVENTS: usize = 65_536;
@@ -230,6 +231,7 @@ impl Pose {
             return false;
         }
         self.segment = 0;
+        self.sift(sums);
         if self.round > LAST_ROUND {
             self.slope = self.trend(sums);
             return true;
@@ -245,6 +247,7 @@ impl Pose {
         self.harmonic *= if sharper { 2 } else { 1 };
         self.coherence = if sharper { at_high } else { at_low };
         self.phases = Some(if sharper { &sums.high } else { &sums.low }.phases());
+        if std::env::var("DBG").is_ok() { std::println!("  round {} harmonic {} coherence {:.2} blocks {} events {}", self.round, self.harmonic, self.coherence, self.path.blocks(), self.events); }
         self.round += 1;
         match self.round {
             SECOND_ROUND => self.divide(self.seen(FIRST_EVENTS).min(SECOND_BLOCKS)),
@@ -313,6 +316,16 @@ impl Pose {
         }
     }
 
+    /// Leaves out blocks that are not in step with the rest: the path between their neighbours brings them back.
+    fn sift(&self, sums: &mut Sums) {
+        let least = (BLOCK_SHARE * self.coherence).max(LEAST_SHARE);
+        for block in &mut sums.blocks {
+            if block.share() < least {
+                *block = Block::EMPTY;
+            }
+        }
+    }
+
     /// Moves the knots to where the blocks want them: least squares with a path that walks rather than jumps, a
     /// tridiagonal system of 3 x 3 matrices, solved from end to end.
     fn correct(&mut self, blocks: &[Block; MAX_KNOTS]) {
@@ -378,7 +391,11 @@ impl Pose {
             let y = self.path.at(t_us).turn_rad + off_rad;
             points.push(Point { u: t_us / half_us, y, weight }).ok();
         }
-        let trend = Trend::fit(&points, fold)?;
+        if std::env::var("DBG").is_ok() {
+            std::println!("start");
+            for p in &points { let k = self.path.at(p.u * half_us); std::println!("K {:.1} {:.3} {:.3} {:.6} {}", p.u * half_us * 1e-3, self.disc.x_px + k.x_px, self.disc.y_px + k.y_px, p.y + self.omega_rad_s * p.u * half_us * 1e-6, p.weight); }
+        }
+        let trend = Trend::fit(&points, fold)?; if std::env::var("DBG").is_ok() { std::println!("{trend:?} fold {fold}"); }
         let factor = student_over_normal(trend.degrees_of_freedom);
         let half_s = half_us * 1e-6;
         Some(Slope {
@@ -446,15 +463,15 @@ impl Block {
 
     /// What the block knows about turn and shift.
     fn weight(&self) -> Matrix3<f32> {
-        self.normal() * self.share().max(LEAST_SHARE)
+        self.normal() * self.share()
     }
 
     /// Turn in radians by which the block as a whole is off, and its weight.
     fn turn_rad(&self) -> Option<(f32, f32)> {
-        let share = self.share();
-        if self.count < LEAST_IN_BLOCK || share <= LEAST_SHARE {
+        if self.count < LEAST_IN_BLOCK {
             return None;
         }
+        let share = self.share();
         // Events scatter by about 1 / (2 share) in phase squared, which gives the prior its weight.
         let prior = 1.0 / (2.0 * share * SHIFT_PRIOR_PX * SHIFT_PRIOR_PX);
         let damped =
