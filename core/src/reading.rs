@@ -244,10 +244,6 @@ pub struct Evidence {
     pub symmetry_score: Option<f32>,
     /// Initial alignment (paper, "Initial Estimation"): speed in rad/s.
     pub initial_rad_s: Option<f32>,
-    /// Initial alignment with the axis left free: speed in rad/s.
-    pub free_axis_rad_s: Option<f32>,
-    /// Its standard error in rad/s, from the scatter over the window.
-    pub free_axis_sigma_rad_s: Option<f32>,
     /// Refinement (paper, "Estimation Refinement"): speed in rad/s.
     pub refined_rad_s: Option<f32>,
     /// Standard error of the refinement in rad/s.
@@ -258,9 +254,11 @@ pub struct Evidence {
     pub lock_rad_s: Option<f32>,
     /// Standard error of the long-baseline registration in rad/s.
     pub lock_sigma_rad_s: Option<f32>,
-    /// Slope of the polar phase: speed in rad/s.
+    /// How sharply the events show the rotor's edges half-way to the rim, in pixels.
+    pub sharpness_px: Option<f32>,
+    /// Trend of the polar phase: speed in rad/s.
     pub phase_rad_s: Option<f32>,
-    /// Standard error of the polar phase slope in rad/s.
+    /// Standard error of the polar phase's trend in rad/s.
     pub phase_sigma_rad_s: Option<f32>,
     /// Fractional-baseline test: deviation as a share of the angle of symmetry.
     pub fractional_deviation: Option<f32>,

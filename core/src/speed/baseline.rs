@@ -11,7 +11,7 @@ use super::initial::median;
 use super::path::{Moving, Path};
 use super::statistics::{mean_and_error, student_over_normal};
 use crate::limits::MAX_PAIRS;
-use crate::math::TAU;
+use crate::math::{TAU, sqrt};
 use crate::registration::{Cut, Icp, Progress, Residual};
 use crate::rotors::Disc;
 use crate::store::Window;
@@ -68,6 +68,8 @@ pub struct Pairs {
     /// Whether the next pair is being registered.
     registering: bool,
     yaws: Vec<f32, MAX_PAIRS>,
+    /// How many of the pairs share no slice with another.
+    independent: f32,
 }
 
 impl Pairs {
@@ -81,7 +83,18 @@ impl Pairs {
         let folds = (SLICE_EVENTS / in_slice.max(1.0)) as u32;
         let folds = folds.clamp(1, MOST_FOLDS).min(1 + (0.5 * room) as u32);
         let pairs = pairs.min(MAX_PAIRS as u32);
-        Self { pace, periods, pairs, next: 0, folds, registering: false, yaws: Vec::new() }
+        let span = folds as f32 - 1.0 + SLICE_PERIODS;
+        let independent = (1.0 + room / span).min(pairs as f32);
+        Self {
+            pace,
+            periods,
+            pairs,
+            next: 0,
+            folds,
+            registering: false,
+            yaws: Vec::new(),
+            independent,
+        }
     }
 
     /// Cuts the next pair, or advances its registration by one iteration; `true` once all are done.
@@ -142,15 +155,19 @@ impl Pairs {
         self.periods * self.pace.period_us() * 1e-6
     }
 
-    /// Speed from the mean of the yaws; its error from their scatter with Student's t, as the pairs are
-    /// independent while their slices do not overlap.
+    /// Factor on the standard error of the mean: Student's t, and pairs that share events.
+    fn widening(&self) -> f32 {
+        let shared = sqrt((self.yaws.len() as f32 / self.independent).max(1.0));
+        shared * student_over_normal((self.independent as usize).saturating_sub(1))
+    }
+
+    /// Speed from the mean of the yaws; its error from their scatter.
     #[must_use]
     pub fn mean(&self) -> Option<Estimate> {
         let (mean, error) = mean_and_error(&self.yaws)?;
-        let factor = student_over_normal(self.yaws.len() - 1);
         Some(Estimate {
             omega_rad_s: self.pace.omega_rad_s + mean / self.baseline_s(),
-            sigma_rad_s: factor * error / self.baseline_s(),
+            sigma_rad_s: self.widening() * error / self.baseline_s(),
         })
     }
 
@@ -161,10 +178,9 @@ impl Pairs {
         let middle = median(&mut yaws)?;
         let (_, error) = mean_and_error(&self.yaws)?;
         // The median of normal errors scatters 1.25 times as much as the mean.
-        let factor = 1.25 * student_over_normal(self.yaws.len() - 1);
         Some(Estimate {
             omega_rad_s: self.pace.omega_rad_s + middle / self.baseline_s(),
-            sigma_rad_s: factor * error / self.baseline_s(),
+            sigma_rad_s: 1.25 * self.widening() * error / self.baseline_s(),
         })
     }
 

@@ -5,9 +5,7 @@
 //! second, third, ...: as the store thins a segment octave by octave, the baseline grows
 //! geometrically, each step started from the rate before.
 //!
-//! The ladder climbs in one of two ways. With the axis *fixed* it needs little to see: a single mark on a disc
-//! will do. With the axis *free* it finds the rate of turning whatever the centre, so that a wrong centre,
-//! which misleads everything that counts angles about it, is found out wherever there is enough to see.
+//! The axis is held *fixed*: then a single mark on a disc is enough to see.
 
 use heapless::Vec;
 
@@ -17,7 +15,7 @@ use crate::rotors::Disc;
 use crate::store::{WINDOW_SEGMENTS, Window};
 
 /// Events in a slice at best.
-const MOST_EVENTS: usize = 160;
+const MOST_EVENTS: usize = 512;
 /// Events in a slice at least.
 const LEAST_EVENTS: usize = 24;
 /// Slices that a segment should hold.
@@ -42,7 +40,6 @@ pub type Rates = Vec<f32, WINDOW_SEGMENTS>;
 pub struct Ladder {
     segment: usize,
     disc: Disc,
-    residual: Residual,
     /// Events in a slice.
     size: usize,
     /// Events that the slices so far were cut from.
@@ -59,11 +56,10 @@ pub struct Ladder {
 impl Ladder {
     /// A ladder at the bottom.
     #[must_use]
-    pub const fn new(segment: usize, disc: Disc, residual: Residual) -> Self {
+    pub const fn new(segment: usize, disc: Disc) -> Self {
         Self {
             segment,
             disc,
-            residual,
             size: 0,
             passed: 0,
             level: 0,
@@ -133,7 +129,7 @@ impl Ladder {
             return false;
         }
         let start_rad = self.rate.map_or(0.0, |rate| rate * baseline_s);
-        icp.start(start_rad, self.disc.radius_px, self.residual);
+        icp.start(start_rad, self.disc.radius_px, Residual::FixedAxis);
         self.baseline_s = baseline_s;
         true
     }

@@ -5,13 +5,13 @@ mod verdict;
 use super::baseline::{Estimate, Pace, Pairs};
 use super::initial::{Ladder, Rates, median};
 use super::phase::{Pattern, harmonics, newton};
+use super::path::Path;
 use super::polar::{PolarEvent, PolarTrack, track};
 use super::pose::{Pose, Sums};
-use super::statistics::mean_and_error;
 use super::symmetry::symmetry;
 use crate::math::TAU;
 use crate::reading::{Evidence, Frame, Reason, Speed, Status};
-use crate::registration::{Icp, Residual};
+use crate::registration::Icp;
 use crate::rotors::{Disc, Found};
 use crate::store::{WINDOW_SEGMENTS, Window};
 
@@ -28,9 +28,9 @@ const MOST_STANDING: f32 = 0.8;
 /// slices falls short of the turn by up to a tenth.
 const COARSE_AGREEMENT: f32 = 0.15;
 const MOST_COARSE_AGREEMENT: f32 = 0.25;
-/// The rate about a free axis contradicts when it is off by this share and this many of its standard errors.
-const FREE_AXIS_AGREEMENT: f32 = 0.25;
-const FREE_AXIS_SIGMAS: f32 = 4.0;
+/// Sharpness of the rotor's edges as a share of its radius beyond which they are no edges, and in pixels for a small one.
+const MOST_BLUR: f32 = 0.12;
+const MOST_BLUR_PX: f32 = 1.5;
 /// Two harmonics of one line differ by a fifteenth or more.
 const SCAN_AGREEMENT: f32 = 0.04;
 /// Fewest events of a rotor that are measured.
@@ -44,10 +44,14 @@ const COARSE_PERIODS: f32 = 0.8;
 const ALIKE_SCORE: f32 = 0.85;
 /// Segments that the initial alignment looks at.
 const LADDERS: usize = 3;
+/// Where there are more events than this, more segments are looked at.
+const LADDER_EVENTS: usize = 4_096;
 /// Slice pairs: refinement, lock, fractional-baseline test.
 const REFINEMENT_PAIRS: u32 = 12;
 const LOCK_PAIRS: u32 = 8;
 const FRACTIONAL_PAIRS: u32 = 3;
+/// Where there are more events than this for each pair, more pairs are registered, up to [`MAX_PAIRS`].
+const PAIR_EVENTS: usize = 1_024;
 /// Step of the refinement in symmetry periods (paper: eta x half an angle of symmetry, eta = 0.8).
 const REFINEMENT_PERIODS: f32 = 0.4;
 /// Baseline of the lock as a share of the window.
@@ -119,10 +123,7 @@ pub struct Measurement {
     parts: Option<u8>,
     alike: bool,
     ladder: Option<Ladder>,
-    /// Whether the ladder at hand leaves the axis free.
-    free_axis: bool,
     rates: Rates,
-    free_rates: Rates,
     pairs: Option<Pairs>,
     estimate: Estimate,
     status: Status,
@@ -153,9 +154,7 @@ impl Measurement {
             parts: None,
             alike: true,
             ladder: None,
-            free_axis: false,
             rates: Rates::new(),
-            free_rates: Rates::new(),
             pairs: None,
             estimate: Estimate::default(),
             status: Status::Refused(Reason::Searching),
@@ -323,6 +322,7 @@ impl Measurement {
             return;
         }
         self.turn = 0;
+        self.disc = self.pose.disc();
         self.events = self.pose.events();
         self.evidence.events = self.events as u32;
         if self.events < LEAST_EVENTS {
@@ -332,9 +332,13 @@ impl Measurement {
             self.evidence.phase_rad_s = Some(found.speed.omega_rad_s);
             self.evidence.phase_sigma_rad_s = Some(found.speed.sigma_rad_s);
             self.drift_px_s = found.drift_px_s;
+            self.evidence.sharpness_px = Some(self.pose.sharpness_px());
             if found.alpha_rad_s2.abs() > 4.0 * found.alpha_sigma_rad_s2 {
                 self.alpha_rad_s2 = Some(found.alpha_rad_s2);
             }
+        }
+        if self.pose.sharpness_px() > (MOST_BLUR * self.disc.radius_px).max(MOST_BLUR_PX) {
+            return self.refuse(Reason::Ambiguous);
         }
         if !self.follows {
             self.stage = Stage::Initial;
@@ -365,20 +369,18 @@ impl Measurement {
     /// Initial alignment in every other segment: second coarse witness.
     fn initial(&mut self, window: &Window<'_>, icp: &mut Icp) {
         if let Some(ladder) = &mut self.ladder {
-            if ladder.step(window, self.pose.path(), icp) {
-                let rates = if self.free_axis { &mut self.free_rates } else { &mut self.rates };
-                rates.extend(ladder.rate_rad_s());
+            if ladder.step(window, &Path::STILL, icp) {
+                self.rates.extend(ladder.rate_rad_s());
                 self.ladder = None;
-                self.turn += u8::from(self.free_axis);
-                self.free_axis = !self.free_axis;
+                self.turn += 1;
             }
             return;
         }
         let segments = window.segments().min(WINDOW_SEGMENTS);
-        let segment = usize::from(self.turn) * segments.div_ceil(LADDERS).max(1);
+        let ladders = (self.events / LADDER_EVENTS).clamp(LADDERS, WINDOW_SEGMENTS);
+        let segment = usize::from(self.turn) * segments.div_ceil(ladders).max(1);
         if segment < segments {
-            let residual = if self.free_axis { Residual::FreeAxis } else { Residual::FixedAxis };
-            self.ladder = Some(Ladder::new(segment, self.disc, residual));
+            self.ladder = Some(Ladder::new(segment, self.disc));
             return;
         }
         let Some(initial) = median(&mut self.rates) else {
@@ -391,18 +393,6 @@ impl Measurement {
         let agreement = half_way.clamp(COARSE_AGREEMENT, MOST_COARSE_AGREEMENT);
         if (initial - self.omega_rad_s).abs() > agreement * self.omega_rad_s.abs() {
             return self.refuse(Reason::Ambiguous);
-        }
-        if let (Some(free), Some((_, error))) =
-            (median(&mut self.free_rates), mean_and_error(&self.free_rates))
-        {
-            self.evidence.free_axis_rad_s = Some(free);
-            self.evidence.free_axis_sigma_rad_s = Some(error);
-            let apart = (free - self.omega_rad_s).abs();
-            if apart > FREE_AXIS_SIGMAS * error
-                && apart > FREE_AXIS_AGREEMENT * self.omega_rad_s.abs()
-            {
-                return self.refuse(Reason::Ambiguous);
-            }
         }
         let periods = self.count_periods(window);
         if periods < COARSE_PERIODS {
@@ -429,6 +419,7 @@ impl Measurement {
     }
 
     fn plan(&mut self, window: &Window<'_>, periods: f32, pairs: u32) {
+        let pairs = pairs.max((self.events / PAIR_EVENTS) as u32);
         let plan = Pairs::plan(self.pace(), periods, pairs, self.events, window.duration_us);
         self.pairs = Some(plan);
     }

@@ -54,6 +54,18 @@ impl Path {
         self.step_us
     }
 
+    /// Takes the mean place out of the path and returns it.
+    pub fn centre(&mut self) -> (f32, f32) {
+        let n = (self.knots.len() as f32).max(1.0);
+        let sum = |part: fn(&Knot) -> f32| self.knots.iter().map(part).sum::<f32>() / n;
+        let (x_px, y_px) = (sum(|knot| knot.x_px), sum(|knot| knot.y_px));
+        for knot in &mut self.knots {
+            knot.x_px -= x_px;
+            knot.y_px -= y_px;
+        }
+        (x_px, y_px)
+    }
+
     /// The knots.
     #[must_use]
     pub fn knots(&self) -> &[Knot] {

@@ -44,13 +44,15 @@ const LEAST_SHARE: f32 = 0.05;
 const SHIFT_PRIOR_PX: f32 = 2.0;
 /// How far the path walks from knot to knot.
 const WALK_PX: f32 = 0.5;
+/// The same for a rotor with a single mark, whose shift and turn look alike.
+const WALK_SINGLE_PX: f32 = 0.05;
 const WALK_RAD: f32 = 0.02;
 /// Farthest that a knot is moved at once.
 const STRIDE_PX: f32 = 3.0;
 /// Highest angular harmonic.
 const MOST_HARMONIC: u32 = 96;
 /// A doubled harmonic must keep this share of the events in step.
-const SHARP_COHERENCE: f32 = 0.35;
+const SHARP_COHERENCE: f32 = 0.45;
 /// Blocks over which the wandering of the axis is judged.
 const DRIFT_BLOCKS: usize = 12;
 /// Blocks of the path at first, and once these fit.
@@ -154,11 +156,14 @@ pub struct Pose {
     window_us: f32,
     period_us: f32,
     harmonic: u32,
+    walk_px: f32,
     path: Path,
     /// Blocks in a symmetry period, 0 when blocks are whole periods.
     in_period: usize,
     phases: Option<[(f32, f32); BANKS]>,
     coherence: f32,
+    /// The same before the harmonic was raised.
+    first_coherence: f32,
     /// Rotor's events in the window.
     events: usize,
     round: u8,
@@ -171,17 +176,25 @@ impl Pose {
     /// A pose at rest about the disc's centre. `parts` equal parts, `harmonic` a multiple of them that is known
     /// to keep step.
     #[must_use]
-    pub const fn new(disc: Disc, omega_rad_s: f32, parts: u32, harmonic: u32, window_us: u32) -> Self {
+    pub const fn new(
+        disc: Disc,
+        omega_rad_s: f32,
+        parts: u32,
+        harmonic: u32,
+        window_us: u32,
+    ) -> Self {
         Self {
             disc,
             omega_rad_s,
             window_us: window_us as f32,
             period_us: TAU * 1e6 / (omega_rad_s.abs() * parts as f32),
             harmonic,
+            walk_px: if parts > 1 { WALK_PX } else { WALK_SINGLE_PX },
             path: Path::STILL,
             in_period: 0,
             phases: None,
             coherence: 0.0,
+            first_coherence: 0.0,
             events: 0,
             round: 0,
             segment: 0,
@@ -189,10 +202,17 @@ impl Pose {
         }
     }
 
-    /// Share of the events in step at the last look.
+    /// Share of the events in step at the harmonic that the rotor was found by.
     #[must_use]
     pub const fn coherence(&self) -> f32 {
-        self.coherence
+        self.first_coherence
+    }
+
+    /// How sharply the events show the rotor's edges, in pixels half-way to the rim: the width of what they would be
+    /// scattered over evenly.
+    #[must_use]
+    pub fn sharpness_px(&self) -> f32 {
+        0.5 * self.disc.radius_px / (self.harmonic as f32 * self.coherence.max(LEAST_SHARE))
     }
 
     /// Rotor's events in the window.
@@ -205,6 +225,12 @@ impl Pose {
     #[must_use]
     pub const fn path(&self) -> &Path {
         &self.path
+    }
+
+    /// The disc, its centre the mean place of the axis once all rounds are done.
+    #[must_use]
+    pub const fn disc(&self) -> Disc {
+        self.disc
     }
 
     /// The trend of the turn, once all rounds are done; `None` when too few blocks tell.
@@ -234,6 +260,9 @@ impl Pose {
         self.sift(sums);
         if self.round > LAST_ROUND {
             self.slope = self.trend(sums);
+            let (x_px, y_px) = self.path.centre();
+            self.disc.x_px += x_px;
+            self.disc.y_px += y_px;
             return true;
         }
         let (at_low, at_high) = (sums.low.coherence(), sums.high.coherence());
@@ -246,8 +275,11 @@ impl Pose {
             && 2.0 * at_high > at_low;
         self.harmonic *= if sharper { 2 } else { 1 };
         self.coherence = if sharper { at_high } else { at_low };
+        if self.round <= FINE_ROUND {
+            self.first_coherence = self.coherence;
+        }
         self.phases = Some(if sharper { &sums.high } else { &sums.low }.phases());
-        if std::env::var("DBG").is_ok() { std::println!("  round {} harmonic {} coherence {:.2} blocks {} events {}", self.round, self.harmonic, self.coherence, self.path.blocks(), self.events); }
+        { extern crate std; if std::env::var("DBG").is_ok() { let n = sums.blocks.iter().take(self.path.blocks()).filter(|b| b.count > 0).count(); std::eprintln!("  round {} harmonic {} low {:.2} high {:.2} blocks {} kept {} events {}", self.round, self.harmonic, at_low, at_high, self.path.blocks(), n, self.events); } }
         self.round += 1;
         match self.round {
             SECOND_ROUND => self.divide(self.seen(FIRST_EVENTS).min(SECOND_BLOCKS)),
@@ -332,7 +364,7 @@ impl Pose {
         let blocks = &blocks[..self.path.blocks()];
         let knots = self.path.knots_mut();
         let scatter = 1.0 / (2.0 * self.coherence.max(LEAST_SHARE));
-        let (px, rad) = (scatter / (WALK_PX * WALK_PX), scatter / (WALK_RAD * WALK_RAD));
+        let (px, rad) = (scatter / (self.walk_px * self.walk_px), scatter / (WALK_RAD * WALK_RAD));
         let stiff = Matrix3::from_diagonal(&Vector3::new(rad, px, px));
         let step = |k: usize| -> Option<Vector3<f32>> {
             let (a, b) = (knots.get(k)?, knots.get(k + 1)?);
@@ -349,9 +381,9 @@ impl Pose {
                 pivot += block.weight() / 3.0 + stiff;
                 side += block.right - block.later + stiff * step;
             }
-            let before = k.checked_sub(1).and_then(|i| {
-                Some((blocks.get(i)?, step(i)?, inverses.get(i)?, sides.get(i)?))
-            });
+            let before = k
+                .checked_sub(1)
+                .and_then(|i| Some((blocks.get(i)?, step(i)?, inverses.get(i)?, sides.get(i)?)));
             if let Some((block, step, inverse, before)) = before {
                 let link = link(block);
                 pivot += block.weight() / 3.0 + stiff - link * inverse * link;
@@ -391,11 +423,8 @@ impl Pose {
             let y = self.path.at(t_us).turn_rad + off_rad;
             points.push(Point { u: t_us / half_us, y, weight }).ok();
         }
-        if std::env::var("DBG").is_ok() {
-            std::println!("start");
-            for p in &points { let k = self.path.at(p.u * half_us); std::println!("K {:.1} {:.3} {:.3} {:.6} {}", p.u * half_us * 1e-3, self.disc.x_px + k.x_px, self.disc.y_px + k.y_px, p.y + self.omega_rad_s * p.u * half_us * 1e-6, p.weight); }
-        }
-        let trend = Trend::fit(&points, fold)?; if std::env::var("DBG").is_ok() { std::println!("{trend:?} fold {fold}"); }
+        { extern crate std; if std::env::var("DBG").is_ok() { std::eprintln!("fold {fold} in_period {} h {} coh {} first {}", self.in_period, self.harmonic, self.coherence, self.first_coherence); for p in &points { std::eprintln!("{:?}", p); } } }
+        let trend = Trend::fit(&points, fold)?;
         let factor = student_over_normal(trend.degrees_of_freedom);
         let half_s = half_us * 1e-6;
         Some(Slope {

@@ -127,8 +127,8 @@ impl Trend {
             let degrees_of_freedom = free - degree;
             let squares = points.product(&rest, &rest);
             let variance = squares / degrees_of_freedom as f32;
-            let cost = free as f32 * ln(squares.max(f32::MIN_POSITIVE))
-                + DEGREE_COST * degree as f32;
+            let cost =
+                free as f32 * ln(squares.max(f32::MIN_POSITIVE)) + DEGREE_COST * degree as f32;
             let sum = |terms: &mut dyn Iterator<Item = f32>| terms.fold(0.0, |a, b| a + b);
             let found = Self {
                 slope: sum(&mut slopes.iter().zip(coefficients).map(|(s, c)| s * c)),

@@ -98,10 +98,8 @@ pub fn evidence(readings: &[Reading], first_us: u64) -> String {
             );
             let _ = writeln!(
                 text,
-                "      initial {}  free axis {} ± {}  refined {} ± {}  further {}  lock {} ± {}  phase {} ± {}  fractional {}",
+                "      initial {}  refined {} ± {}  further {}  lock {} ± {}  phase {} ± {}  fractional {}  sharp to {} px",
                 rpm(e.initial_rad_s),
-                rpm(e.free_axis_rad_s),
-                rpm(e.free_axis_sigma_rad_s),
                 rpm(e.refined_rad_s),
                 rpm(e.refined_sigma_rad_s),
                 rpm(e.further_rad_s),
@@ -109,7 +107,8 @@ pub fn evidence(readings: &[Reading], first_us: u64) -> String {
                 rpm(e.lock_sigma_rad_s),
                 rpm(e.phase_rad_s),
                 rpm(e.phase_sigma_rad_s),
-                plain(e.fractional_deviation)
+                plain(e.fractional_deviation),
+                plain(e.sharpness_px)
             );
         }
     }

@@ -13,6 +13,8 @@ const LOCK_AGREEMENT: f32 = 2e-3;
 const LOCK_SIGMAS: f32 = 8.0;
 /// A lock with a larger relative error is only coarse.
 const MOST_LOCK_SIGMA: f32 = 3e-3;
+/// Share of a coarse reading's error that is left where the witnesses of the lock agree.
+const ALIKE_SIGMA: f32 = 0.2;
 /// A coarse reading's phase must give its speed and be straight within these shares, and the initial alignment of
 /// every segment must give it within the last.
 const COARSE_PHASE: f32 = 0.05;
@@ -47,9 +49,14 @@ impl Measurement {
             } else if sharp && long {
                 self.estimate = both;
                 self.status = Status::Locked;
+            } else if sharp {
+                // Right if the parts are as alike as they look: the window shows too few to be sure.
+                let spread = ALIKE_SIGMA * self.estimate.sigma_rad_s;
+                let sigma_rad_s = sqrt(both.sigma_rad_s * both.sigma_rad_s + spread * spread);
+                self.estimate = Estimate { sigma_rad_s, ..both };
             }
         }
-        if lock.is_none() && !self.coarse_stands(phase) {
+        if phase.is_none() || (lock.is_none() && !self.coarse_stands(phase)) {
             self.status = Status::Refused(Reason::Ambiguous);
         }
         let clock = stated.clock_sigma_ppm * 1e-6 * self.estimate.omega_rad_s;
@@ -81,9 +88,11 @@ impl Measurement {
 fn combine(a: Estimate, b: Estimate) -> Estimate {
     let (va, vb) = (a.sigma_rad_s * a.sigma_rad_s, b.sigma_rad_s * b.sigma_rad_s);
     let (wa, wb) = (vb / (va + vb), va / (va + vb));
+    // Where they are farther apart than their errors say, these are too small by as much (Birge's ratio).
+    let apart = (a.omega_rad_s - b.omega_rad_s) * (a.omega_rad_s - b.omega_rad_s) / (va + vb);
     Estimate {
         omega_rad_s: a.omega_rad_s * wa + b.omega_rad_s * wb,
-        sigma_rad_s: sqrt(wa * va + wb * vb),
+        sigma_rad_s: sqrt((wa * va + wb * vb) * apart.max(1.0)),
     }
 }
 
