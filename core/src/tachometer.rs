@@ -429,7 +429,6 @@ impl<'m> Tachometer<'m> {
                 let (index, outcome) = (*index, measurement.result());
                 let followed = self.candidates.get(index).is_some_and(|c| c.followed.is_some());
                 if followed && outcome.status != Status::Locked {
-                    #[cfg(not(target_os = "none"))] { extern crate std; std::eprintln!("LOST {:?}", outcome); }
                     // Lost: look at the whole image again, in this very window.
                     self.candidates.clear();
                     self.outcomes.clear();

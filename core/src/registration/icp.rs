@@ -24,8 +24,6 @@ const TRIM: f32 = 2.5;
 pub enum Residual {
     /// Positions only, turning about the centre: needs no idea of the speed (initial alignment, thin slices).
     FixedAxis,
-    /// Positions only, yaw and shift free: needs no idea of the centre either.
-    FreeAxis,
     /// Distance along the motion at this speed in rad/s, with time as third coordinate (refinement and lock).
     Helicoid {
         /// Speed to a few percent, positive = clockwise.
@@ -146,7 +144,7 @@ fn iterate(
     grid: &Grid,
 ) -> Option<(f32, f32)> {
     let lambda_px_per_s = match run.residual {
-        Residual::FixedAxis | Residual::FreeAxis => 0.0,
+        Residual::FixedAxis => 0.0,
         // Twice the mean speed of the points: flat optimum between one and four times.
         Residual::Helicoid { omega_rad_s } => 1.4 * run.radius_px * omega_rad_s.abs(),
     };
@@ -161,7 +159,7 @@ fn iterate(
         let to = &target[index];
         found += 1;
         match run.residual {
-            Residual::FixedAxis | Residual::FreeAxis => {
+            Residual::FixedAxis => {
                 squares += distance2;
                 if distance2 <= run.limit_px * run.limit_px {
                     point.add((x_px, y_px), (to.x_px, to.y_px));
@@ -186,8 +184,7 @@ fn iterate(
     }
     run.limit_px = TRIM * sqrt(squares / found as f32);
     let (turn_rad, shift_px) = match run.residual {
-        Residual::FixedAxis => (point.about_origin()?, (0.0, 0.0)),
-        Residual::FreeAxis => point.solve()?,
+        Residual::FixedAxis => (point.solve()?, (0.0, 0.0)),
         Residual::Helicoid { .. } => helicoid.solve()?,
     };
     run.rigid = run.rigid.then(turn_rad, shift_px);

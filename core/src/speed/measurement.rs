@@ -4,8 +4,8 @@ mod verdict;
 
 use super::baseline::{Estimate, Pace, Pairs};
 use super::initial::{Ladder, Rates, median};
-use super::phase::{Pattern, harmonics, newton};
 use super::path::Path;
+use super::phase::{Pattern, harmonics, newton};
 use super::polar::{PolarEvent, PolarTrack, track};
 use super::pose::{Pose, Sums};
 use super::symmetry::symmetry;
@@ -28,9 +28,12 @@ const MOST_STANDING: f32 = 0.8;
 /// slices falls short of the turn by up to a tenth.
 const COARSE_AGREEMENT: f32 = 0.15;
 const MOST_COARSE_AGREEMENT: f32 = 0.25;
-/// Sharpness of the rotor's edges as a share of its radius beyond which they are no edges, and in pixels for a small one.
-const MOST_BLUR: f32 = 0.12;
-const MOST_BLUR_PX: f32 = 1.5;
+/// Blur of the rotor's edges, as a share of its radius and in pixels for a small one, beyond which they are no edges;
+/// and within which they are so sharp that a registration that went astray does not count against them.
+const MOST_BLUR: (f32, f32) = (0.1, 1.5);
+const LEAST_BLUR: (f32, f32) = (0.06, 1.3);
+/// What the jitter of the events in dim light may add to it.
+const MOST_JITTER_S: f32 = 150e-6;
 /// Two harmonics of one line differ by a fifteenth or more.
 const SCAN_AGREEMENT: f32 = 0.04;
 /// Fewest events of a rotor that are measured.
@@ -337,20 +340,27 @@ impl Measurement {
                 self.alpha_rad_s2 = Some(found.alpha_rad_s2);
             }
         }
-        if self.pose.sharpness_px() > (MOST_BLUR * self.disc.radius_px).max(MOST_BLUR_PX) {
+        if !self.sharp(MOST_BLUR) {
             return self.refuse(Reason::Ambiguous);
         }
         if !self.follows {
             self.stage = Stage::Initial;
             return;
         }
-        self.evidence.coherence = Some(self.pose.coherence());
-        if self.pose.coherence() < LEAST_COHERENCE {
+        self.evidence.coherence = Some(self.pose.first_coherence());
+        if self.pose.first_coherence() < LEAST_COHERENCE {
             return self.refuse(Reason::NoRotation);
         }
         self.count_periods(window);
         self.plan_lock(window, self.omega_rad_s.abs() * FOLLOWING_SIGMA);
         self.stage = Stage::Lock;
+    }
+
+    /// Whether the rotor's edges are at least so sharp.
+    fn sharp(&self, (share, px): (f32, f32)) -> bool {
+        let radius_px = self.disc.radius_px;
+        let jitter_px = 0.5 * radius_px * self.omega_rad_s.abs() * MOST_JITTER_S;
+        self.pose.sharpness_px() < (share * radius_px).max(px) + jitter_px
     }
 
     /// One Newton step of centre and speed; `false` when the phase gives none.
@@ -383,15 +393,17 @@ impl Measurement {
             self.ladder = Some(Ladder::new(segment, self.disc));
             return;
         }
-        let Some(initial) = median(&mut self.rates) else {
-            return self.refuse(Reason::TooFewEvents);
-        };
-        self.evidence.initial_rad_s = Some(initial);
+        self.evidence.initial_rad_s = median(&mut self.rates);
         // A single mark has no symmetry to be mistaken for another, and registration less to go by.
         let rivals = if self.parts == Some(1) { 1 } else { self.windings };
         let half_way = 0.5 / (rivals as f32 + 1.0);
-        let agreement = half_way.clamp(COARSE_AGREEMENT, MOST_COARSE_AGREEMENT);
-        if (initial - self.omega_rad_s).abs() > agreement * self.omega_rad_s.abs() {
+        let agreement =
+            half_way.clamp(COARSE_AGREEMENT, MOST_COARSE_AGREEMENT) * self.omega_rad_s.abs();
+        let agrees = self
+            .evidence
+            .initial_rad_s
+            .is_some_and(|initial| (initial - self.omega_rad_s).abs() < agreement);
+        if !agrees && !self.sharp(LEAST_BLUR) {
             return self.refuse(Reason::Ambiguous);
         }
         let periods = self.count_periods(window);

@@ -51,8 +51,8 @@ const WALK_RAD: f32 = 0.02;
 const STRIDE_PX: f32 = 3.0;
 /// Highest angular harmonic.
 const MOST_HARMONIC: u32 = 96;
-/// A doubled harmonic must keep this share of the events in step.
-const SHARP_COHERENCE: f32 = 0.45;
+/// A doubled harmonic must keep this share of the events in step that were so at first.
+const SHARP_COHERENCE: f32 = 0.5;
 /// Blocks over which the wandering of the axis is judged.
 const DRIFT_BLOCKS: usize = 12;
 /// Blocks of the path at first, and once these fit.
@@ -204,7 +204,7 @@ impl Pose {
 
     /// Share of the events in step at the harmonic that the rotor was found by.
     #[must_use]
-    pub const fn coherence(&self) -> f32 {
+    pub const fn first_coherence(&self) -> f32 {
         self.first_coherence
     }
 
@@ -271,7 +271,7 @@ impl Pose {
         }
         let sharper = self.round > FINE_ROUND
             && 2 * self.harmonic <= MOST_HARMONIC
-            && at_high > SHARP_COHERENCE
+            && at_high > SHARP_COHERENCE * self.first_coherence
             && 2.0 * at_high > at_low;
         self.harmonic *= if sharper { 2 } else { 1 };
         self.coherence = if sharper { at_high } else { at_low };
@@ -279,7 +279,6 @@ impl Pose {
             self.first_coherence = self.coherence;
         }
         self.phases = Some(if sharper { &sums.high } else { &sums.low }.phases());
-        { extern crate std; if std::env::var("DBG").is_ok() { let n = sums.blocks.iter().take(self.path.blocks()).filter(|b| b.count > 0).count(); std::eprintln!("  round {} harmonic {} low {:.2} high {:.2} blocks {} kept {} events {}", self.round, self.harmonic, at_low, at_high, self.path.blocks(), n, self.events); } }
         self.round += 1;
         match self.round {
             SECOND_ROUND => self.divide(self.seen(FIRST_EVENTS).min(SECOND_BLOCKS)),
@@ -323,7 +322,7 @@ impl Pose {
         for event in window.segment(self.segment) {
             let Some((x_px, y_px, r2)) = disc.place(*event) else { continue };
             sums.index += 1;
-            if sums.index % stride != 0 {
+            if !sums.index.is_multiple_of(stride) {
                 continue;
             }
             let t_us = disc.since_middle_us(*event);
@@ -423,7 +422,6 @@ impl Pose {
             let y = self.path.at(t_us).turn_rad + off_rad;
             points.push(Point { u: t_us / half_us, y, weight }).ok();
         }
-        { extern crate std; if std::env::var("DBG").is_ok() { std::eprintln!("fold {fold} in_period {} h {} coh {} first {}", self.in_period, self.harmonic, self.coherence, self.first_coherence); for p in &points { std::eprintln!("{:?}", p); } } }
         let trend = Trend::fit(&points, fold)?;
         let factor = student_over_normal(trend.degrees_of_freedom);
         let half_s = half_us * 1e-6;

@@ -1,8 +1,8 @@
 //! The verdict on a rotor: what the witnesses say together, and how sure they are.
 
 use super::super::baseline::Estimate;
-use super::{Measurement, Stated};
-use crate::math::sqrt;
+use super::{LEAST_BLUR, Measurement, Stated};
+use crate::math::{TAU, sqrt};
 use crate::reading::{Reason, Status};
 use crate::store::Window;
 
@@ -20,6 +20,9 @@ const ALIKE_SIGMA: f32 = 0.2;
 const COARSE_PHASE: f32 = 0.05;
 const COARSE_PHASE_SIGMA: f32 = 0.03;
 const COARSE_SPREAD: f32 = 0.5;
+/// A coarse reading with a larger relative error is none, and what a hand shakes, in pixels.
+const MOST_COARSE_SIGMA: f32 = 0.015;
+const SHAKE_PX: f32 = 3.0;
 /// Roll of a hand-held camera for each pixel of shift: tremor turns the camera by about one milliradian as
 /// it shifts the image by one pixel.
 const ROLL_RAD_PER_PX: f32 = 1e-3;
@@ -65,9 +68,26 @@ impl Measurement {
         } else {
             0.0
         };
+        if self.status == Status::Coarse {
+            self.widen_coarse();
+        }
         let own = self.estimate.sigma_rad_s;
         self.estimate.sigma_rad_s = sqrt(own * own + clock * clock);
         self.roll_sigma_rad_s = roll;
+    }
+
+    /// A coarse reading of a single mark is as good as its axis holds still: what the mark does and what the camera
+    /// does look alike. One that is worse than coarse is none.
+    fn widen_coarse(&mut self) {
+        let turn_rad = self.evidence.periods.unwrap_or(0.0) * TAU;
+        if self.parts == Some(1) {
+            let shake = SHAKE_PX / (self.disc.radius_px * turn_rad) * self.omega_rad_s;
+            let own = self.estimate.sigma_rad_s;
+            self.estimate.sigma_rad_s = sqrt(own * own + shake * shake);
+        }
+        if self.estimate.sigma_rad_s > MOST_COARSE_SIGMA * self.omega_rad_s.abs() {
+            self.status = Status::Refused(Reason::Ambiguous);
+        }
     }
 
     /// Whether a reading without a lock may stand: it has no long baseline to contradict it, so the phase must advance
@@ -79,7 +99,7 @@ impl Measurement {
                 && phase.sigma_rad_s < COARSE_PHASE_SIGMA * omega.abs()
         });
         let alike = |rate: &f32| (rate - omega).abs() < COARSE_SPREAD * omega.abs();
-        even && self.rates.iter().all(alike)
+        even && (self.rates.iter().all(alike) || self.sharp(LEAST_BLUR))
     }
 }
 
