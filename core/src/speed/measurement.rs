@@ -53,8 +53,10 @@ const LADDER_EVENTS: usize = 4_096;
 const REFINEMENT_PAIRS: u32 = 12;
 const LOCK_PAIRS: u32 = 8;
 const FRACTIONAL_PAIRS: u32 = 3;
+/// The lock of a rotor that is followed: the phase tells its speed, and these bear it out.
+const FOLLOWING_PAIRS: u32 = 3;
 /// Where there are more events than this for each pair, more pairs are registered, up to [`MAX_PAIRS`].
-const PAIR_EVENTS: usize = 1_024;
+const PAIR_EVENTS: usize = 1_536;
 /// Step of the refinement in symmetry periods (paper: eta x half an angle of symmetry, eta = 0.8).
 const REFINEMENT_PERIODS: f32 = 0.4;
 /// Baseline of the lock as a share of the window.
@@ -318,8 +320,9 @@ impl Measurement {
         if self.turn == 0 {
             self.turn = 1;
             let parts = if self.alike { u32::from(self.parts.unwrap_or(1)).max(1) } else { 1 };
-            self.pose =
+            let pose =
                 Pose::new(self.disc, self.omega_rad_s, parts, self.harmonic, window.duration_us);
+            self.pose = if self.follows { pose.known() } else { pose };
         }
         if !self.pose.step(window, sums) {
             return;
@@ -418,7 +421,7 @@ impl Measurement {
             self.stage = Stage::Verdict;
             return;
         }
-        self.plan(window, REFINEMENT_PERIODS, REFINEMENT_PAIRS);
+        self.plan(window, REFINEMENT_PERIODS, self.worth(REFINEMENT_PAIRS));
         self.stage = Stage::Refinement;
     }
 
@@ -431,9 +434,13 @@ impl Measurement {
     }
 
     fn plan(&mut self, window: &Window<'_>, periods: f32, pairs: u32) {
-        let pairs = pairs.max((self.events / PAIR_EVENTS) as u32);
         let plan = Pairs::plan(self.pace(), periods, pairs, self.events, window.duration_us);
         self.pairs = Some(plan);
+    }
+
+    /// As many pairs as so many events are worth.
+    fn worth(&self, least: u32) -> u32 {
+        least.max((self.events / PAIR_EVENTS) as u32)
     }
 
     /// Advances the planned pairs; the finished set once all are registered.
@@ -456,7 +463,7 @@ impl Measurement {
         {
             return self.refuse(Reason::Ambiguous);
         }
-        self.plan(window, REFINEMENT_PERIODS, REFINEMENT_PAIRS);
+        self.plan(window, REFINEMENT_PERIODS, self.worth(REFINEMENT_PAIRS));
         if let Some(pairs) = &mut self.pairs {
             pairs.retarget(refined.omega_rad_s);
         }
@@ -482,7 +489,8 @@ impl Measurement {
         if !self.alike && m >= parts {
             m = libm::floorf(m / parts) * parts;
         }
-        self.plan(window, m, LOCK_PAIRS);
+        let pairs = if self.follows { FOLLOWING_PAIRS } else { self.worth(LOCK_PAIRS) };
+        self.plan(window, m, pairs);
     }
 
     /// Long-baseline lock.
@@ -499,7 +507,8 @@ impl Measurement {
                 return;
             }
         }
-        self.plan(window, (longest - 0.35).max(0.65), FRACTIONAL_PAIRS);
+        let pairs = if self.follows { 1 } else { FRACTIONAL_PAIRS };
+        self.plan(window, (longest - 0.35).max(0.65), pairs);
         self.stage = Stage::Fractional;
     }
 
@@ -526,7 +535,8 @@ impl Measurement {
             found: Found {
                 disc: Disc { x_px, y_px, ..self.disc },
                 omega_rad_s: self.omega_rad_s,
-                windings: self.harmonic,
+                // Low enough that what a hand moves between windows does not lead astray.
+                windings: self.harmonic.max(self.pose.harmonic() / 4),
                 line_hz: self.line_hz,
                 ..Found::default()
             },

@@ -58,14 +58,37 @@ const DRIFT_BLOCKS: usize = 12;
 /// Blocks of the path at first, and once these fit.
 const FIRST_BLOCKS: usize = 12;
 const SECOND_BLOCKS: usize = 24;
-/// Rounds from which on the path has more blocks, as many as the events allow, all events count, and the last.
-const SECOND_ROUND: u8 = 4;
-const FINE_ROUND: u8 = 5;
-const ALL_ROUND: u8 = 10;
-const LAST_ROUND: u8 = 13;
-/// Events looked at before, and after.
-const FIRST_EVENTS: usize = 3_072;
-const MOST_EVENTS: usize = 65_536;
+
+/// What is done in which round.
+#[derive(Clone, Copy, Debug)]
+struct Schedule {
+    /// Rounds from which on the path has more blocks, as many as the events allow, and as many as all of them allow.
+    second: u8,
+    fine: u8,
+    all: u8,
+    /// The last that corrects the path; one more look gives the trend.
+    last: u8,
+    /// Events looked at before `all`, and the share and number of all events looked at from then on.
+    first_events: usize,
+    share: usize,
+    most_events: usize,
+}
+
+impl Schedule {
+    /// For a rotor of which little is known.
+    const NEW: Self = Self {
+        second: 4,
+        fine: 5,
+        all: 11,
+        last: 13,
+        first_events: 3_072,
+        share: 1,
+        most_events: 65_536,
+    };
+    /// For a rotor that was followed in the window before: a third of the events tell it as well.
+    const KNOWN: Self =
+        Self { second: 2, fine: 3, all: 6, last: 7, first_events: 1_536, share: 3, ..Self::NEW };
+}
 
 /// Template of a rotor: a harmonic by ring and polarity.
 #[derive(Clone, Copy, Debug)]
@@ -134,18 +157,12 @@ pub struct Sums {
     blocks: [Block; MAX_KNOTS],
     low: Template,
     high: Template,
-    /// Events of the rotor so far, those looked at among them.
-    index: usize,
 }
 
 impl Sums {
     /// Nothing looked at. A constant, so that it is copied into place instead of being built on the stack.
-    pub const EMPTY: Self = Self {
-        blocks: [Block::EMPTY; MAX_KNOTS],
-        low: Template::EMPTY,
-        high: Template::EMPTY,
-        index: 0,
-    };
+    pub const EMPTY: Self =
+        Self { blocks: [Block::EMPTY; MAX_KNOTS], low: Template::EMPTY, high: Template::EMPTY };
 }
 
 /// What is found of the pose.
@@ -167,6 +184,7 @@ pub struct Pose {
     /// Rotor's events in the window.
     events: usize,
     round: u8,
+    schedule: Schedule,
     /// Segment of the window that is looked at next.
     segment: usize,
     slope: Option<Slope>,
@@ -197,9 +215,23 @@ impl Pose {
             first_coherence: 0.0,
             events: 0,
             round: 0,
+            schedule: Schedule::NEW,
             segment: 0,
             slope: None,
         }
+    }
+
+    /// The same for a rotor whose place and speed are known from the window before: fewer rounds will do.
+    #[must_use]
+    pub const fn known(mut self) -> Self {
+        self.schedule = Schedule::KNOWN;
+        self
+    }
+
+    /// Angular harmonic that was followed at last.
+    #[must_use]
+    pub const fn harmonic(&self) -> u32 {
+        self.harmonic
     }
 
     /// Share of the events in step at the harmonic that the rotor was found by.
@@ -245,7 +277,7 @@ impl Pose {
         if self.round == 0 {
             let disc = Moving::new(self.disc, &self.path, window);
             self.events = window.events().filter(|event| disc.place(*event).is_some()).count();
-            self.divide(self.seen(FIRST_EVENTS).min(FIRST_BLOCKS));
+            self.divide(self.blocks().min(FIRST_BLOCKS));
             self.round = 1;
         }
         if self.segment == 0 {
@@ -258,7 +290,8 @@ impl Pose {
         }
         self.segment = 0;
         self.sift(sums);
-        if self.round > LAST_ROUND {
+        let Schedule { second, fine, all, last, .. } = self.schedule;
+        if self.round > last {
             self.slope = self.trend(sums);
             let (x_px, y_px) = self.path.centre();
             self.disc.x_px += x_px;
@@ -269,29 +302,38 @@ impl Pose {
         if self.round > 1 {
             self.correct(&sums.blocks);
         }
-        let sharper = self.round > FINE_ROUND
+        let sharper = self.round > fine
             && 2 * self.harmonic <= MOST_HARMONIC
             && at_high > SHARP_COHERENCE * self.first_coherence
             && 2.0 * at_high > at_low;
         self.harmonic *= if sharper { 2 } else { 1 };
         self.coherence = if sharper { at_high } else { at_low };
-        if self.round <= FINE_ROUND {
+        if self.round <= fine {
             self.first_coherence = self.coherence;
         }
         self.phases = Some(if sharper { &sums.high } else { &sums.low }.phases());
         self.round += 1;
-        match self.round {
-            SECOND_ROUND => self.divide(self.seen(FIRST_EVENTS).min(SECOND_BLOCKS)),
-            FINE_ROUND => self.divide(self.seen(FIRST_EVENTS)),
-            ALL_ROUND => self.divide(self.seen(MOST_EVENTS)),
-            _ => {}
+        if self.round == second {
+            self.divide(self.blocks().min(SECOND_BLOCKS));
+        } else if self.round == fine || self.round == all {
+            self.divide(self.blocks());
         }
         false
     }
 
+    /// Events that this round looks at, at most.
+    fn most(&self) -> usize {
+        let Schedule { all, first_events, share, most_events, .. } = self.schedule;
+        if self.round < all {
+            first_events
+        } else {
+            (self.events / share).clamp(first_events, most_events)
+        }
+    }
+
     /// Blocks that so many events are enough for.
-    fn seen(&self, most: usize) -> usize {
-        self.events.min(most) / BLOCK_EVENTS
+    fn blocks(&self) -> usize {
+        self.events.min(self.most()) / BLOCK_EVENTS
     }
 
     /// Lays the path through up to `most` blocks.
@@ -312,19 +354,14 @@ impl Pose {
     /// Looks at the events of a segment: how far the blocks are off the template, and the templates of this harmonic
     /// and of twice it. Early rounds look at some events only.
     fn look(&self, window: &Window<'_>, sums: &mut Sums) {
-        let most = if self.round < ALL_ROUND { FIRST_EVENTS } else { MOST_EVENTS };
-        let stride = self.events.div_ceil(most).max(1);
+        let stride = self.events.div_ceil(self.most()).max(1);
         let disc = Moving::new(self.disc, &self.path, window);
         let rate = TurnRate::from_rad_s(self.omega_rad_s);
         let rings_per_px = RINGS as f32 / self.disc.radius_px.max(1.0);
         let m = self.harmonic as f32;
         let phases = self.phases.as_ref();
-        for event in window.segment(self.segment) {
+        for event in window.segment(self.segment).iter().step_by(stride) {
             let Some((x_px, y_px, r2)) = disc.place(*event) else { continue };
-            sums.index += 1;
-            if !sums.index.is_multiple_of(stride) {
-                continue;
-            }
             let t_us = disc.since_middle_us(*event);
             let turn = Turn::from_rad(self.path.at(t_us as f32).turn_rad).plus(rate.after(t_us));
             let angle = Turn::of_vector(y_px, x_px);
