@@ -302,10 +302,11 @@ impl Pose {
         if self.round > 1 {
             self.correct(&sums.blocks);
         }
-        let sharper = self.round > fine
-            && 2 * self.harmonic <= MOST_HARMONIC
-            && at_high > SHARP_COHERENCE * self.first_coherence
-            && 2.0 * at_high > at_low;
+        let worth = at_high > at_low
+            || self.round > fine
+                && at_high > SHARP_COHERENCE * self.first_coherence
+                && 2.0 * at_high > at_low;
+        let sharper = worth && 2 * self.harmonic <= MOST_HARMONIC;
         self.harmonic *= if sharper { 2 } else { 1 };
         self.coherence = if sharper { at_high } else { at_low };
         if self.round <= fine {
