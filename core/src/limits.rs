@@ -12,17 +12,20 @@ pub const DEVICE_HEAT_CELLS: usize = 6_400;
 /// Largest k that K-means tries.
 pub const MAX_CLUSTERS: usize = 8;
 
-/// Lines of the spectrum that are looked into: each costs a coherence map.
+/// Lines of the spectrum that are looked into: each costs a map.
 pub const MAX_LINES: usize = 16;
+
+/// Cells of the search: 6 400 x 2 B = 12.5 KiB; 80 x 80 cells of 4 px cover a 320x320 sensor.
+pub const VISIT_CELLS: usize = 6_400;
+
+/// Events of the search: 6 144 x 2 B = 12 KiB.
+pub const VISITS: usize = 6_144;
 
 /// Events of one rotor in polar coordinates: 3 072 x 8 B = 24 KiB.
 pub const POLAR_EVENTS: usize = 3_072;
 
-/// Time bins of the scan: 1 024 x 8 B = 8 KiB. 150 ms / 1 024 = 146 us, Nyquist limit 3.4 kHz.
-pub const SCAN_BINS: usize = 1_024;
-
-/// Cells of the coherence map: 1 536 x 20 B = 30 KiB; 44 x 33 cells of 8 px cover a 346x260 sensor.
-pub const COHERENCE_CELLS: usize = 1_536;
+/// Cells of the coherence map: 576 x 20 B = 11 KiB; 24 x 24 cells cover the square around a disc.
+pub const COHERENCE_CELLS: usize = 576;
 
 /// Phasors in one look for a winding: 128 x 24 B = 3 KiB.
 pub const WINDING_PHASORS: usize = 128;

@@ -10,11 +10,10 @@ use heapless::Vec;
 use crate::event::{Event, Geometry, GyroSample};
 use crate::limits::{MAX_ROTORS, MAX_SUSPECTS};
 use crate::reading::{Evidence, Frame, Reading, Reason, RotorReading, Status};
-use crate::rotors::extraction::{self, Extraction, View, weigh_heat};
-use crate::rotors::{Coherence, Disc, Found, HeatMap};
+use crate::rotors::extraction::{self, Extraction, View};
+use crate::rotors::{Disc, Found, HeatMap, Spectrum, Visits};
 use crate::speed::measurement::{Bench, Measurement, Outcome, Stated};
 use crate::speed::polar::PolarTrack;
-use crate::speed::scan::Scanner;
 use crate::store::{SPARE_SEGMENTS, Store, StoredEvent, WINDOW_SEGMENTS};
 use crate::tracker::Tracker;
 
@@ -184,7 +183,7 @@ pub struct Tachometer<'m> {
     ignored: Ignored,
     job: Job,
     polar: PolarTrack,
-    scanner: Scanner,
+    spectrum: Spectrum,
     scratch: Scratch,
     candidates: Vec<Suspect, MAX_SUSPECTS>,
     outcomes: Vec<Outcome, MAX_ROTORS>,
@@ -214,7 +213,7 @@ impl<'m> Tachometer<'m> {
             ignored: Ignored::default(),
             job: Job::Idle,
             polar: PolarTrack::new(),
-            scanner: Scanner::default(),
+            spectrum: Spectrum::default(),
             scratch: Scratch::Measure(Bench::EMPTY),
             candidates: Vec::new(),
             outcomes: Vec::new(),
@@ -311,7 +310,6 @@ impl<'m> Tachometer<'m> {
         self.candidates.clear();
         self.outcomes.clear();
         self.in_step_hz = None;
-        weigh_heat(self.heat.counts(), self.weights);
         let known = self.tracker.known().iter().filter(|known| known.can_be_followed());
         for known in known {
             let followed = Some((known.parts, known.alike));
@@ -401,14 +399,11 @@ impl<'m> Tachometer<'m> {
         match &mut self.job {
             Job::Idle => true,
             Job::Search(extraction) => {
-                let view = View {
-                    window,
-                    grid: self.heat.grid(),
-                    map_grid: Coherence::grid(self.settings.geometry),
-                    weights: &self.weights[..self.heat.counts().len()],
-                };
+                let grid = Visits::grid(self.settings.geometry, self.weights.len());
+                let Some(weights) = self.weights.get_mut(..grid.len()) else { return true };
+                let mut view = View { window, grid, weights };
                 let Scratch::Search(scratch) = &mut self.scratch else { return true };
-                if extraction.step(&view, &mut self.polar, &mut self.scanner, scratch) {
+                if extraction.step(&mut view, &mut self.polar, &mut self.spectrum, scratch) {
                     self.in_step_hz = extraction.in_step_hz();
                     for candidate in extraction.candidates() {
                         self.candidates.push(Suspect { found: *candidate, followed: None }).ok();

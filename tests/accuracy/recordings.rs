@@ -201,7 +201,6 @@ fn simulated_in_full_memory() {
 }
 
 #[test]
-#[ignore = "dev05: one of four rotors is not found in the device's memory"]
 fn simulated_in_the_devices_memory() {
     simulated(Capacity::Device);
 }

@@ -5,15 +5,12 @@
 //! which counts alone cannot do.
 
 use super::heat::CellGrid;
-use crate::event::Geometry;
 use crate::limits::COHERENCE_CELLS;
 use crate::math::{TAU, TurnRate, sqrt};
-use crate::store::Window;
+use crate::store::{StoredEvent, Window};
 
 /// Power over chance (1 for unrelated events) below which a cell counts as out of step.
-const LEAST_POWER: f32 = 4.0;
-/// Heat units for one event in step, so that the integer heat keeps its resolution.
-const HEAT_PER_EVENT: f32 = 10.0;
+const LEAST_POWER: f32 = 2.5;
 
 /// The events of one cell and polarity as a phasor at the map's frequency.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -32,7 +29,7 @@ pub struct Phasor {
     pub on: bool,
 }
 
-/// Map of events in step with a frequency, in cells of at least 8x8 pixels.
+/// Events in step with a frequency, cell by cell around one disc.
 #[derive(Debug)]
 pub struct Coherence {
     /// By polarity and cell.
@@ -47,21 +44,18 @@ impl Default for Coherence {
 }
 
 impl Coherence {
-    /// The grid used for a sensor.
-    #[must_use]
-    pub const fn grid(geometry: Geometry) -> CellGrid {
-        CellGrid::fit(geometry, 3, COHERENCE_CELLS)
-    }
-
-    /// Fills the map for one frequency. Cost: about 70 instructions an event.
+    /// Fills the map for one frequency with the events on the grid. Cost: about 100 instructions an event.
     pub fn fill(&mut self, window: &Window<'_>, grid: CellGrid, line_hz: f32) {
         self.sums = [[(0.0, 0.0); COHERENCE_CELLS]; 2];
         self.counts = [[0; COHERENCE_CELLS]; 2];
         let mid_us = (window.duration_us / 2) as i32;
         let rate = TurnRate::from_rad_s(line_hz * TAU);
-        for (event, ()) in window.even(usize::MAX, |_| Some(())).1 {
-            let (sin, cos) = rate.after(event.since(window.start_us) - mid_us).sin_cos();
+        let inside = |event: StoredEvent| {
             let index = grid.index(event.x(), event.y());
+            (index < grid.len()).then_some(index)
+        };
+        for (event, index) in window.even(usize::MAX, inside).1 {
+            let (sin, cos) = rate.after(event.since(window.start_us) - mid_us).sin_cos();
             let bank = usize::from(event.is_on());
             if let Some(sum) = self.sums[bank].get_mut(index) {
                 sum.0 += cos;
@@ -89,16 +83,5 @@ impl Coherence {
                 })
             })
         })
-    }
-
-    /// Writes the number of events in step as heat, cell by cell.
-    pub fn heat(&self, grid: CellGrid, heat: &mut [u16]) {
-        heat.fill(0);
-        for phasor in self.phasors(grid) {
-            let index = grid.index(phasor.x_px as u16, phasor.y_px as u16);
-            if let Some(cell) = heat.get_mut(index) {
-                *cell = cell.saturating_add((phasor.amplitude * HEAT_PER_EVENT) as u16);
-            }
-        }
     }
 }

@@ -16,9 +16,15 @@ use crate::math::sqrt;
 
 /// Most windings that are tried: 8 blades seen at the second overtone.
 const MOST_WINDINGS: usize = 16;
-/// Rings between centre and rim, each with a phase of its own (swept blades), for each polarity.
+/// Most rings between centre and rim, each with a phase of its own (swept blades), for each polarity.
 const RINGS: usize = 4;
 const BANKS: usize = 2 * RINGS;
+/// Phasors that make it worth to tell one more ring apart.
+const PHASORS_A_RING: usize = 16;
+/// Most that the phase may turn within a cell, in radians: more windings are not told apart.
+const MOST_IN_CELL_RAD: f32 = 2.2;
+/// Power that the axes and windings that are tried reach by chance, in standard deviations: one in thirty thousand.
+const CHANCE_SIGMAS: f32 = 4.0;
 /// First search: this many steps to each side.
 const COARSE_STEPS: i32 = 3;
 /// Spacing of the first search, as a share of the radius.
@@ -42,6 +48,8 @@ pub struct Winding {
     pub share: f32,
     /// The same share for zero windings about the same centre: all cells in step, as under a lamp.
     pub share_in_step: f32,
+    /// Power over the highest that unrelated phasors would reach in a search like this: above 1 where there is a rotation.
+    pub over_chance: f32,
 }
 
 /// Collects the phasors for which `inside` holds, evenly thinned to the capacity; returns their number before that too.
@@ -70,6 +78,8 @@ pub struct Explainer {
     /// Phasors before thinning.
     total: usize,
     disc: Disc,
+    /// Most windings that the cells let tell apart.
+    most: usize,
     from: (f32, f32),
     spacing_px: f32,
     halvings: u8,
@@ -78,13 +88,15 @@ pub struct Explainer {
 }
 
 impl Explainer {
-    /// Starts over with the phasors for which `inside` holds.
+    /// Starts over with the phasors for which `inside` holds, of cells of `cell_px`.
     pub fn start(
         &mut self,
         phasors: impl Iterator<Item = Phasor> + Clone,
         inside: impl Fn(&Phasor) -> bool,
         disc: Disc,
+        cell_px: f32,
     ) {
+        self.most = ((MOST_IN_CELL_RAD * disc.radius_px / cell_px) as usize).min(MOST_WINDINGS);
         (self.region, self.total) = collect(phasors, inside);
         self.disc = disc;
         self.from = (disc.x_px, disc.y_px);
@@ -101,7 +113,7 @@ impl Explainer {
         for column in -steps..=steps {
             let x_px = self.from.0 + column as f32 * self.spacing_px;
             let y_px = self.from.1 + self.row as f32 * self.spacing_px;
-            let found = about(&self.region, x_px, y_px, self.disc.radius_px);
+            let found = about(&self.region, x_px, y_px, self.disc.radius_px, self.most);
             if found.share > self.best.share {
                 self.best = found;
             }
@@ -123,18 +135,19 @@ impl Explainer {
     }
 }
 
-/// The winding number that explains the region best about a given axis.
-fn about(region: &[Phasor], x_px: f32, y_px: f32, radius_px: f32) -> Winding {
+/// The winding number of at most `most` that explains the region best about a given axis.
+fn about(region: &[Phasor], x_px: f32, y_px: f32, radius_px: f32, most: usize) -> Winding {
     const TERMS: usize = 2 * MOST_WINDINGS + 1;
     let mut sums = [[(0.0_f32, 0.0_f32); TERMS]; BANKS];
     let mut weights = [(0.0_f32, 0.0_f32); BANKS];
+    let rings = (region.len() / PHASORS_A_RING).clamp(1, RINGS);
     for phasor in region {
         let (dx, dy) = (phasor.x_px - x_px, phasor.y_px - y_px);
         let r = sqrt(dx * dx + dy * dy);
         if r < 1.0 {
             continue;
         }
-        let ring = ((r / radius_px.max(1.0) * RINGS as f32) as usize).min(RINGS - 1);
+        let ring = ((r / radius_px.max(1.0) * rings as f32) as usize).min(rings - 1);
         let bank = 2 * ring + usize::from(phasor.on);
         weights[bank].0 += phasor.amplitude;
         weights[bank].1 += phasor.amplitude * phasor.amplitude;
@@ -143,7 +156,7 @@ fn about(region: &[Phasor], x_px: f32, y_px: f32, radius_px: f32) -> Winding {
         let (re, im) = (phasor.re * norm, phasor.im * norm);
         let (cos, sin) = (dx / r, dy / r);
         let (mut c, mut s) = (1.0_f32, 0.0_f32);
-        for m in 0..=MOST_WINDINGS {
+        for m in 0..=most {
             // z e^{i m theta} and z e^{-i m theta}
             let (rc, is, rs, ic) = (re * c, im * s, re * s, im * c);
             let plus = &mut sums[bank][MOST_WINDINGS + m];
@@ -160,7 +173,8 @@ fn about(region: &[Phasor], x_px: f32, y_px: f32, radius_px: f32) -> Winding {
     // Without each phasor's square, so that a bank of one phasor explains nothing.
     let possible: f32 = weights.iter().map(|(sum, sum2)| sqrt((sum * sum - sum2).max(0.0))).sum();
     let mut found = Winding { x_px, y_px, ..Winding::default() };
-    for term in 0..TERMS {
+    let mut best = MOST_WINDINGS;
+    for term in MOST_WINDINGS - most..=MOST_WINDINGS + most {
         let aligned: f32 = sums
             .iter()
             .zip(&weights)
@@ -173,12 +187,28 @@ fn about(region: &[Phasor], x_px: f32, y_px: f32, radius_px: f32) -> Winding {
         if share > found.share {
             found.share = share;
             found.windings = term as i32 - MOST_WINDINGS as i32;
+            best = term;
         }
         if term == MOST_WINDINGS {
             found.share_in_step = share;
         }
     }
+    let (mut power, mut banks) = (0.0, 0.0);
+    for (sums, (_, squares)) in sums.iter().zip(&weights).filter(|(_, (_, squares))| *squares > 0.0)
+    {
+        let (re, im) = sums[best];
+        power += (re * re + im * im) / squares;
+        banks += 1.0;
+    }
+    found.over_chance = power / highest_by_chance(banks);
     found
+}
+
+/// What a sum of `banks` powers of unrelated phasors, 1 on average each, reaches in a search (Wilson and Hilferty).
+fn highest_by_chance(banks: f32) -> f32 {
+    let banks = banks.max(1.0);
+    let root = 1.0 - 1.0 / (9.0 * banks) + CHANCE_SIGMAS / (3.0 * sqrt(banks));
+    banks * root * root * root
 }
 
 #[cfg(test)]
@@ -206,7 +236,7 @@ mod tests {
 
     fn explain(phasors: &[Phasor], disc: Disc) -> Winding {
         let mut explainer = Explainer::default();
-        explainer.start(phasors.iter().copied(), |_| true, disc);
+        explainer.start(phasors.iter().copied(), |_| true, disc, 8.0);
         while !explainer.step() {}
         explainer.result().3
     }

@@ -7,7 +7,6 @@ pub mod path;
 pub mod phase;
 pub mod polar;
 pub mod pose;
-pub mod scan;
 pub mod statistics;
 pub mod symmetry;
 pub mod trend;

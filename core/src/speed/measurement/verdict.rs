@@ -43,7 +43,10 @@ impl Measurement {
             let sigma =
                 sqrt(lock.sigma_rad_s * lock.sigma_rad_s + phase.sigma_rad_s * phase.sigma_rad_s);
             let agree = apart < (LOCK_AGREEMENT * lock.omega_rad_s.abs()).max(LOCK_SIGMAS * sigma);
-            let whole = self.evidence.fractional_deviation.is_some_and(|d| d < MOST_DEVIATION);
+            // Where the parts were not counted, they are at least as many as the windings of the line.
+            let parts = if self.parts.is_none() { self.windings.max(1) } else { 1 };
+            let deviation = self.evidence.fractional_deviation.map(|d| d * parts as f32);
+            let whole = deviation.is_some_and(|d| d < MOST_DEVIATION);
             let both = combine(lock, phase);
             let sharp = both.sigma_rad_s < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
             let long = self.wanted_us <= 1.02 * window.duration_us as f32;

@@ -1,0 +1,72 @@
+//! Which rotation is believed.
+
+use super::coherence::Phasor;
+use super::disc::Disc;
+use super::extraction::Found;
+use super::heat::CellGrid;
+use super::winding::{Explainer, Winding};
+use crate::math::{TAU, sqrt};
+
+/// Least share of its disc that a rotor's phasors cover: a mark on a rim sweeps a fifth.
+const LEAST_COVER: f32 = 0.08;
+/// A rotation must explain this share of one cluster's phasors.
+const LEAST_SHARE: f32 = 0.6;
+/// By how much it must explain more than "all in step" does.
+const LEAST_LEAD: f32 = 0.2;
+/// Fewest phasors that a rotation is believed on.
+pub const LEAST_PHASORS: usize = 12;
+/// Farthest axis from the disc's centre, in radii.
+const MOST_OFF_CENTRE: f32 = 0.7;
+
+/// Whether a phasor belongs to a disc.
+pub fn inside(phasor: &Phasor, part: &Disc) -> bool {
+    let (dx, dy) = (phasor.x_px - part.x_px, phasor.y_px - part.y_px);
+    let reach = 1.2 * part.radius_px;
+    dx * dx + dy * dy < reach * reach
+}
+
+/// A rotor, when the winding is one to be believed.
+pub fn believe(explainer: &Explainer, line_hz: f32, grid: CellGrid) -> Option<Found> {
+    let (region, total, part, winding) = explainer.result();
+    let Winding { share, share_in_step, windings, over_chance, .. } = winding;
+    let thinned = total as f32 / region.len().max(1) as f32;
+    let axis = Disc { x_px: winding.x_px, y_px: winding.y_px, radius_px: 0.0 };
+    let off_centre = MOST_OFF_CENTRE * part.radius_px;
+    let believed = windings != 0
+        && region.len() >= LEAST_PHASORS
+        && over_chance > 1.0
+        && share >= LEAST_SHARE
+        && share - share_in_step >= LEAST_LEAD
+        && part.distance2(&axis) <= off_centre * off_centre;
+    let radius_px = rim(region, &axis);
+    let cell_px = grid.cell_px();
+    // Both polarities of a cell are phasors of their own.
+    let covered_px2 = 0.5 * total as f32 * cell_px * cell_px;
+    let disc_px2 = core::f32::consts::PI * radius_px * radius_px;
+    (believed && covered_px2 > LEAST_COVER * disc_px2).then(|| Found {
+        disc: Disc { radius_px, ..axis },
+        omega_rad_s: line_hz * TAU / windings as f32,
+        windings: windings.unsigned_abs(),
+        line_hz,
+        share,
+        explained: share * region.iter().map(|p| p.amplitude).sum::<f32>() * thinned,
+    })
+}
+
+/// Distance from the axis within which 95 % of the events in step lie.
+fn rim(region: &[Phasor], axis: &Disc) -> f32 {
+    let distance = |phasor: &Phasor| {
+        let (dx, dy) = (phasor.x_px - axis.x_px, phasor.y_px - axis.y_px);
+        sqrt(dx * dx + dy * dy)
+    };
+    let total: f32 = region.iter().map(|p| p.amplitude).sum();
+    let (mut low, mut high) = (0.0_f32, 2048.0_f32);
+    // Bisection instead of a sort: the region is not ours to reorder.
+    for _ in 0..12 {
+        let middle = 0.5 * (low + high);
+        let within: f32 =
+            region.iter().filter(|p| distance(p) <= middle).map(|p| p.amplitude).sum();
+        if within < 0.95 * total { low = middle } else { high = middle }
+    }
+    high
+}

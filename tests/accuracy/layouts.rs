@@ -1,0 +1,246 @@
+//! Where rotors stand and what else is in the picture: each scene is measured in both memories against its truth.
+#![allow(clippy::panic)] // A test fails by it.
+
+use evtach_core::{Direction, Geometry, Reading, RotorReading, Status};
+use evtach_host::measure::Capacity;
+use evtach_host::synth::presets::{Preset, hand, wall};
+use evtach_host::synth::scene::{Background, Lamp, Sensor, Shape};
+use evtach_host::synth::{Rotor, Scene, Truth, generate};
+use evtach_tests::{Loaded, measure, show};
+
+/// Largest relative error of a speed.
+const LARGEST_ERROR: f64 = 0.01;
+
+/// A scene's readings.
+struct Measured {
+    truth: Truth,
+    readings: Vec<Reading>,
+}
+
+fn run(scene: &Scene, capacity: Capacity) -> Measured {
+    let made = generate(scene).expect("a scene in range");
+    let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
+    let (readings, _) = measure(&Loaded { geometry, events: made.events }, capacity);
+    Measured { truth: made.truth, readings }
+}
+
+/// Signed speed of a reading in rpm.
+fn rpm(rotor: &RotorReading) -> Option<f64> {
+    let speed = rotor.speed?;
+    let sign = if speed.direction() == Direction::Cw { 1.0 } else { -1.0 };
+    Some(sign * f64::from(speed.rpm()))
+}
+
+impl Measured {
+    /// The last reading of a rotor of the scene that has a speed.
+    fn of(&self, number: usize) -> Option<&RotorReading> {
+        let truth = &self.truth.rotors[number];
+        let near = |rotor: &&RotorReading| {
+            let dx = f64::from(rotor.x_px) - truth.centre_px[0];
+            let dy = f64::from(rotor.y_px) - truth.centre_px[1];
+            dx.hypot(dy) < 0.5 * truth.radius_px
+        };
+        let last = |reading: &Reading| reading.rotors.iter().any(|r| near(&r) && r.speed.is_some());
+        let reading = self.readings.iter().rev().find(|reading| last(reading))?;
+        reading.rotors.iter().filter(near).find(|rotor| rotor.speed.is_some())
+    }
+
+    /// What is wrong with the speeds of all rotors; a rotor without one is wrong where `all` are owed.
+    fn wrong_speeds(&self, name: &str, all: bool) -> Vec<String> {
+        let mut wrong = Vec::new();
+        for (number, truth) in self.truth.rotors.iter().enumerate() {
+            let expected = truth.rpm_camera_mean_signed;
+            match self.of(number).and_then(rpm) {
+                Some(read) if (read / expected - 1.0).abs() <= LARGEST_ERROR => {}
+                Some(read) => wrong.push(format!("{name}: {expected:+.1} rpm read as {read:+.1}")),
+                None if all => wrong.push(format!("{name}: {expected:+.1} rpm: no speed")),
+                None => {}
+            }
+        }
+        let speeds = self.readings.iter().flat_map(|reading| &reading.rotors).filter_map(rpm);
+        for read in speeds {
+            let known = self.truth.rotors.iter().any(|truth| {
+                (read / truth.rpm_camera_mean_signed - 1.0).abs() <= 5.0 * LARGEST_ERROR
+            });
+            if !known {
+                wrong.push(format!("{name}: {read:+.1} rpm, which nothing turns at"));
+            }
+        }
+        wrong
+    }
+}
+
+/// Every rotor with its right speed, in both memories.
+fn all_read(name: &str, scene: &Scene) {
+    let wrong: Vec<String> = Capacity::ALL
+        .into_iter()
+        .flat_map(|capacity| {
+            let name = format!("{name}, {} memory", capacity.as_str());
+            let wrong = run(scene, capacity).wrong_speeds(&name, true);
+            show(&format!("{name}: {} wrong", wrong.len()));
+            wrong
+        })
+        .collect();
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+}
+
+fn at(x_px: f64, y_px: f64, radius_px: f64, rpm: f64) -> Rotor {
+    Rotor { x_px, y_px, radius_px, rpm, ..Rotor::default() }
+}
+
+fn scene(seed: u64, rotors: Vec<Rotor>) -> Scene {
+    Scene { seed, rotors, duration_ms: 210.0, ..Scene::default() }
+}
+
+fn wide(seed: u64, rotors: Vec<Rotor>) -> Scene {
+    Scene { width_px: 640, height_px: 480, ..scene(seed, rotors) }
+}
+
+#[test]
+fn a_busy_background_from_the_hand() {
+    let background = Background { contrast: 0.4, boxes: 20, ..wall() };
+    let rotor = at(150.0, 120.0, 45.0, -2200.0);
+    all_read("busy", &Scene { camera: hand(), background, ..scene(60, vec![rotor]) });
+}
+
+#[test]
+fn two_that_touch() {
+    all_read("touching", &Scene { seed: 61, duration_ms: 210.0, ..Preset::Touching.scene() });
+}
+
+#[test]
+fn radii_of_60_and_25_px() {
+    let rotors = vec![at(100.0, 130.0, 60.0, 2400.0), at(250.0, 130.0, 25.0, -3100.0)];
+    all_read("unequal radii", &scene(62, rotors));
+}
+
+#[test]
+#[ignore = "the slow one is not read in the device's memory: too few of its events are kept beside the fast one's"]
+fn speeds_of_ten_to_one() {
+    let rotors = vec![at(95.0, 130.0, 50.0, 600.0), at(250.0, 130.0, 50.0, 6000.0)];
+    all_read("ten to one", &Scene { duration_ms: 320.0, ..scene(63, rotors) });
+}
+
+#[test]
+fn four_of_unequal_speeds_and_directions() {
+    let rotors = vec![
+        at(160.0, 120.0, 45.0, 1200.0),
+        at(470.0, 125.0, 45.0, -6000.0),
+        at(165.0, 355.0, 45.0, 3000.0),
+        at(475.0, 350.0, 45.0, -2000.0),
+    ];
+    all_read("four", &wide(64, rotors));
+}
+
+#[test]
+fn three_in_a_row() {
+    let rotors = vec![
+        at(60.0, 130.0, 42.0, 2900.0),
+        at(172.0, 130.0, 42.0, -3300.0),
+        at(284.0, 130.0, 42.0, 2500.0),
+    ];
+    all_read("row", &scene(65, rotors));
+}
+
+#[test]
+fn six_at_once() {
+    let speeds = [3000.0, -3400.0, 2600.0, -3900.0, 4300.0, -2200.0];
+    let rotors = speeds.iter().enumerate().map(|(i, rpm)| {
+        at(110.0 + 210.0 * (i % 3) as f64, 130.0 + 220.0 * (i / 3) as f64, 45.0, *rpm)
+    });
+    all_read("six", &wide(66, rotors.collect()));
+}
+
+#[test]
+fn partly_outside_the_frame() {
+    all_read("cropped", &scene(67, vec![at(30.0, 130.0, 55.0, -2700.0)]));
+}
+
+#[test]
+fn tilted_by_20_degrees() {
+    all_read("tilted", &Scene { seed: 68, duration_ms: 210.0, ..Preset::Tilted.scene() });
+}
+
+#[test]
+#[ignore = "the slow mark is not found at all: half a turn shows no frequency beside a rotor that is found"]
+fn one_locked_while_another_is_refused() {
+    // Half a turn in all: the slow one has not shown one period of its single blade.
+    let slow = Rotor { blades: 1, ..at(250.0, 130.0, 50.0, 240.0) };
+    let measured = run(&scene(69, vec![at(90.0, 130.0, 50.0, 3000.0), slow]), Capacity::Full);
+    let wrong = measured.wrong_speeds("one of two", false);
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+    assert!(measured.of(0).is_some_and(|rotor| rotor.status == Status::Locked));
+    let refused = |rotor: &RotorReading| {
+        (rotor.x_px - 250.0).abs() < 30.0 && matches!(rotor.status, Status::Refused(_))
+    };
+    let both = measured
+        .readings
+        .iter()
+        .any(|reading| reading.status == Status::Locked && reading.rotors.iter().any(refused));
+    assert!(both, "{:?}", measured.readings);
+}
+
+/// More parts than are named: the speed, and no blade count.
+#[test]
+#[ignore = "16 spokes are refused as no_rotation in the device's memory; all else holds"]
+fn nine_eleven_and_sixteen_spokes() {
+    let mut wrong = Vec::new();
+    for (seed, blades) in [(70, 9), (71, 11), (72, 16)] {
+        let spokes = Rotor { blades, shape: Shape::Spokes, ..at(173.0, 130.0, 80.0, -400.0) };
+        for capacity in Capacity::ALL {
+            let name = format!("{blades} spokes, {} memory", capacity.as_str());
+            let scene = Scene { duration_ms: 420.0, ..scene(seed, vec![spokes.clone()]) };
+            let measured = run(&scene, capacity);
+            wrong.extend(measured.wrong_speeds(&name, false));
+            match measured.of(0) {
+                Some(rotor) if rotor.blades.is_some() => {
+                    wrong.push(format!("{name}: {:?} blades", rotor.blades));
+                }
+                Some(_) => {}
+                None => {
+                    let last = measured.readings.last().map(|reading| reading.status);
+                    if !matches!(last, Some(Status::Refused(evtach_core::Reason::Ambiguous))) {
+                        wrong.push(format!("{name}: {last:?}"));
+                    }
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn one_odd_blade() {
+    for (seed, blades) in [(73, 3), (74, 5)] {
+        let rotor = Rotor { blades, odd_width: 0.6, ..at(173.0, 130.0, 55.0, 1900.0) };
+        all_read("odd blade", &scene(seed, vec![rotor]));
+    }
+}
+
+#[test]
+fn without_polarity() {
+    let sensor = Sensor { all_on: true, ..Sensor::default() };
+    let rotors = vec![at(100.0, 130.0, 50.0, 2000.0), at(250.0, 130.0, 40.0, -3500.0)];
+    all_read("all ON", &Scene { sensor, ..scene(75, rotors) });
+}
+
+/// Lamps of both mains, with overtones, over the whole picture: a rotor keeps its speed, and without one there is none.
+#[test]
+fn flicker_neither_bends_a_speed_nor_makes_one() {
+    for (seed, frequency_hz) in [(76, 100.0), (77, 120.0)] {
+        let lamp = Lamp { frequency_hz, depth: 0.12, harmonics: vec![0.3, 0.15], spot_px: None };
+        // Blades that pass close to the lamp's first overtone.
+        let rotor = at(173.0, 130.0, 50.0, 20.0 * frequency_hz * 2.0 * 0.93);
+        let lit = Scene { lamp: Some(lamp.clone()), ..scene(seed, vec![rotor]) };
+        all_read("under a lamp", &lit);
+        let spot_px = Some([150.0, 120.0, 60.0]);
+        for lamp in [lamp.clone(), Lamp { depth: 0.6, spot_px, ..lamp }] {
+            let dark = Scene { lamp: Some(lamp), ..scene(seed, Vec::new()) };
+            for capacity in Capacity::ALL {
+                let measured = run(&dark, capacity);
+                let wrong = measured.wrong_speeds("a lamp alone", false);
+                assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+            }
+        }
+    }
+}
