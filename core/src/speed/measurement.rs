@@ -304,6 +304,14 @@ impl Measurement {
     fn symmetry(&mut self, stated: &Stated, polar: &[PolarEvent]) {
         let symmetry = symmetry(polar, self.disc, self.omega_rad_s);
         self.parts = stated.blades.or(symmetry.parts);
+        // The line may be an overtone of the blades' own.
+        if let Some(parts) = self.parts.map(u32::from).filter(|parts| *parts > 0) {
+            let at =
+                |harmonic| Pattern::learn(polar, self.disc, self.omega_rad_s, harmonic).coherence();
+            if at(parts) > at(self.harmonic) {
+                self.harmonic = parts;
+            }
+        }
         self.alike = stated.blades.is_none() && symmetry.score >= ALIKE_SCORE;
         self.evidence.symmetry_score = Some(symmetry.score);
         let rpm = self.omega_rad_s.abs() * Speed::RPM_PER_RAD_S;
@@ -322,6 +330,7 @@ impl Measurement {
             let parts = if self.alike { u32::from(self.parts.unwrap_or(1)).max(1) } else { 1 };
             let pose =
                 Pose::new(self.disc, self.omega_rad_s, parts, self.harmonic, window.duration_us);
+            let pose = if self.alike { pose } else { pose.unlike() };
             self.pose = if self.follows { pose.known() } else { pose };
         }
         if !self.pose.step(window, sums) {
@@ -536,7 +545,11 @@ impl Measurement {
                 disc: Disc { x_px, y_px, ..self.disc },
                 omega_rad_s: self.omega_rad_s,
                 // Low enough that what a hand moves between windows does not lead astray.
-                windings: self.harmonic.max(self.pose.harmonic() / 4),
+                windings: if self.alike {
+                    self.harmonic.max(self.pose.harmonic() / 4)
+                } else {
+                    self.harmonic
+                },
                 line_hz: self.line_hz,
                 ..Found::default()
             },

@@ -173,6 +173,7 @@ pub struct Pose {
     window_us: f32,
     period_us: f32,
     harmonic: u32,
+    most_harmonic: u32,
     walk_px: f32,
     path: Path,
     /// Blocks in a symmetry period, 0 when blocks are whole periods.
@@ -207,6 +208,7 @@ impl Pose {
             window_us: window_us as f32,
             period_us: TAU * 1e6 / (omega_rad_s.abs() * parts as f32),
             harmonic,
+            most_harmonic: MOST_HARMONIC,
             walk_px: if parts > 1 { WALK_PX } else { WALK_SINGLE_PX },
             path: Path::STILL,
             in_period: 0,
@@ -225,6 +227,14 @@ impl Pose {
     #[must_use]
     pub const fn known(mut self) -> Self {
         self.schedule = Schedule::KNOWN;
+        self
+    }
+
+    /// The same for a rotor whose parts differ: the template takes them for one, so that a high harmonic shows their
+    /// differences.
+    #[must_use]
+    pub const fn unlike(mut self) -> Self {
+        self.most_harmonic = 2 * self.harmonic;
         self
     }
 
@@ -306,7 +316,7 @@ impl Pose {
             || self.round > fine
                 && at_high > SHARP_COHERENCE * self.first_coherence
                 && 2.0 * at_high > at_low;
-        let sharper = worth && 2 * self.harmonic <= MOST_HARMONIC;
+        let sharper = worth && 2 * self.harmonic <= self.most_harmonic;
         self.harmonic *= if sharper { 2 } else { 1 };
         self.coherence = if sharper { at_high } else { at_low };
         if self.round <= fine {
