@@ -140,7 +140,7 @@ async fn measure_all(
         writeln!(console, "{}spent push={push} poll={poll}", Lines(reading)).ok();
         console.flush();
     };
-    measure(tachometer, &header, &mut blocks, pace, &mut costs, show).await;
+    measure(tachometer, &mut blocks, pace, &mut costs, show).await;
     let mut console = Console::default();
     writeln!(
         console,
