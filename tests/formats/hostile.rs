@@ -202,9 +202,11 @@ fn cut_files_give_what_is_there() {
             assert!(found.error.is_none(), "{name}: {:?}", found.error);
             let count = found.events.len();
             assert!(count > 10_000 && found.events == events[..count], "{name}: {count} events");
-            // Without its last byte, AEDAT4 lacks a part of its table and text its last newline: no event.
-            if keep == whole.len() - 1 && !matches!(format, WriteFormat::Aedat4 | WriteFormat::Csv)
-            {
+            // Without its last byte, AEDAT4 lacks a part of its table, text its last newline and SPI the mark of
+            // its end: no event.
+            let ends_in_event =
+                !matches!(format, WriteFormat::Aedat4 | WriteFormat::Csv | WriteFormat::Spi);
+            if keep == whole.len() - 1 && ends_in_event {
                 assert_eq!(
                     (count, found.recording.side().notes.len()),
                     (events.len() - 1, 1),
@@ -233,6 +235,27 @@ fn damage_in_the_midst_is_told_with_its_place_behind_the_good_events() {
     let message = found.error.expect("damage").to_string();
     assert!(message.contains("line 20002") && message.contains("x is \"what\""), "{message}");
     assert!(found.events == events[..20_000]);
+}
+
+#[test]
+fn damaged_frames_of_an_spi_stream_are_left_out_and_their_events_counted() {
+    let events = some_events(30_000);
+    let mut bytes = bytes_of(WriteFormat::Spi, &events);
+    for at in (10_000..bytes.len() - 1000).step_by(20_000) {
+        bytes[at..at + 3].fill(0x55);
+    }
+    let found = read_bytes("a.spi", &bytes, None).expect("a stream");
+    assert!(found.error.is_none(), "{:?}", found.error);
+    let lost = events.len() - found.events.len();
+    assert!(lost > 500 && found.recording.lost() == lost as u64, "{lost}");
+    let notes = &found.recording.side().notes;
+    assert!(notes.len() == 1 && notes[0].contains(&format!("{lost} in ")), "{notes:?}");
+
+    // Its first frame tells the sensor; so does each a tenth of a second later.
+    bytes[10] ^= 1;
+    let found = read_bytes("a.spi", &bytes, None).expect("a stream");
+    assert_eq!(found.recording.geometry, SIZE);
+    assert!(refusal("a.spi", &bytes[..2000]).contains("no frame tells the sensor"));
 }
 
 #[test]

@@ -16,6 +16,7 @@ mod open;
 mod prophesee_header;
 mod raw;
 mod ros2;
+mod spi;
 pub mod write;
 
 use evtach_core::{Event, Geometry};
