@@ -3,12 +3,13 @@
 #![expect(unsafe_code, reason = "the vector table's link to its handlers")]
 
 use core::arch::asm;
+use core::cell::Cell;
 use core::ffi::CStr;
 use core::fmt::{Display, Write as _};
 
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use embassy_executor::InterruptExecutor;
-use embassy_futures::block_on;
+use embassy_sync::blocking_mutex::Mutex as BlockingMutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::zerocopy_channel::{Channel, Receiver, Sender};
 use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
@@ -16,13 +17,14 @@ use evtach_core::{Geometry, Memory, Reading, Settings, StoredEvent, Tachometer};
 use evtach_firmware::cost::{Costs, Spent};
 use evtach_firmware::intake::{self, BLOCKS, Block, Pace};
 use evtach_firmware::measure::measure;
-use evtach_firmware::record::Header;
 use evtach_firmware::report::Lines;
+use evtach_firmware::sensor::spi::{Acquired, AlwaysReady, Flash, SpiSensor, acquire};
 use semihosting::experimental::env;
 use semihosting::{fs, process};
 use static_cell::{ConstStaticCell, StaticCell};
 
 use crate::console::{Console, File};
+use crate::pl022::{AlwaysSelected, Pl022};
 use crate::stack;
 use crate::timers::{self, Irq, Ticks};
 
@@ -37,6 +39,8 @@ static HEAT: ConstStaticCell<[u16; DEVICE_HEAT_CELLS]> =
 static WEIGHTS: ConstStaticCell<[u8; DEVICE_HEAT_CELLS]> =
     ConstStaticCell::new([0; DEVICE_HEAT_CELLS]);
 static TACHOMETER: StaticCell<Tachometer<'_>> = StaticCell::new();
+/// How acquisition over SPI stands.
+static ACQUIRED: BlockingMutex<Mutex, Cell<Option<Acquired>>> = BlockingMutex::new(Cell::new(None));
 static INTAKE: InterruptExecutor = InterruptExecutor::new();
 static MEASURE: InterruptExecutor = InterruptExecutor::new();
 
@@ -59,22 +63,23 @@ fn main() -> ! {
         fail("the peripherals are taken");
     };
     timers::start(&mut peripherals.NVIC);
-    let (mut file, pace) = command_line();
-    let header = match block_on(intake::open(&mut file)) {
-        Ok(header) => header,
-        Err(error) => fail(error),
-    };
-    let tachometer = tachometer(header.geometry);
+    let (played, pace) = command_line();
+    let tachometer = tachometer();
     let (sender, receiver) = CHANNEL.init(Channel::new(BUFFERS.take())).split();
 
     Irq::Measure.set_priority(&mut peripherals.NVIC, 0xC0);
     Irq::Intake.set_priority(&mut peripherals.NVIC, 0x80);
-    match (measure_all(tachometer, header, receiver, pace), take_in(file, header, pace, sender)) {
-        (Ok(measure), Ok(intake)) => {
-            MEASURE.start(Irq::Measure).spawn(measure);
-            INTAKE.start(Irq::Intake).spawn(intake);
-        }
-        (Err(error), _) | (_, Err(error)) => fail(error),
+    match measure_all(tachometer, receiver, pace) {
+        Ok(measure) => MEASURE.start(Irq::Measure).spawn(measure),
+        Err(error) => fail(error),
+    }
+    let intake = INTAKE.start(Irq::Intake);
+    let spawned = match played {
+        Played::File(file) => take_in_file(file, pace, sender).map(|task| intake.spawn(task)),
+        Played::Flash => take_in_spi(pace, sender).map(|task| intake.spawn(task)),
+    };
+    if let Err(error) = spawned {
+        fail(error);
     }
     loop {
         cortex_m::asm::wfi();
@@ -86,41 +91,65 @@ fn main() -> ! {
 /// A function of its own, because parts of it are built on the stack first, and `main` never gives
 /// back what its frame takes.
 #[inline(never)]
-fn tachometer(geometry: Geometry) -> &'static mut Tachometer<'static> {
+fn tachometer() -> &'static mut Tachometer<'static> {
     let events = STORE.init_with(|| [StoredEvent::default(); DEVICE_EVENTS]);
     let memory = Memory { events, heat: HEAT.take(), weights: WEIGHTS.take() };
-    TACHOMETER.init_with(|| Tachometer::new(Settings::new(geometry), memory))
+    // The first block tells the sensor's size, and the tachometer is set to it.
+    let size = Geometry { width_px: 320, height_px: 320 };
+    TACHOMETER.init_with(|| Tachometer::new(Settings::new(size), memory))
 }
 
-/// The file and the pace that the command line asks for.
-fn command_line() -> (File, Pace) {
+/// What is played.
+enum Played {
+    /// A file of the host.
+    File(File),
+    /// What lies in the flash behind the SPI controller.
+    Flash,
+}
+
+/// What the command line asks for.
+fn command_line() -> (Played, Pace) {
+    const USAGE: &str = "usage: FILE [sensor], or: spi [sensor]";
     let Ok(arguments) = env::args::<PATH_BYTES>() else { fail("the command line is too long") };
     let mut arguments = (&arguments).skip(1).map(|argument| argument.unwrap_or_default());
-    let (Some(path), pace) = (arguments.next(), arguments.next()) else {
-        fail("usage: FILE [sensor]");
-    };
+    let (Some(path), pace) = (arguments.next(), arguments.next()) else { fail(USAGE) };
     let pace = match pace {
         None => Pace::File,
         Some("sensor") => Pace::Sensor,
-        Some(_) => fail("usage: FILE [sensor]"),
+        Some(_) => fail(USAGE),
     };
+    if path == "spi" {
+        return (Played::Flash, pace);
+    }
     let mut bytes = [0; PATH_BYTES];
     bytes[..path.len()].copy_from_slice(path.as_bytes());
     let Ok(path) = CStr::from_bytes_until_nul(&bytes) else { fail("the path is too long") };
     match fs::File::open(path) {
-        Ok(file) => (File(file), pace),
+        Ok(file) => (Played::File(File(file)), pace),
         Err(error) => fail(error),
     }
 }
 
 #[embassy_executor::task]
-async fn take_in(
-    mut file: File,
-    header: Header,
-    pace: Pace,
-    mut blocks: Sender<'static, Mutex, Block>,
-) {
+async fn take_in_file(mut file: File, pace: Pace, mut blocks: Sender<'static, Mutex, Block>) {
+    let header = match intake::open(&mut file).await {
+        Ok(header) => header,
+        Err(error) => fail(error),
+    };
     if let Err(error) = intake::take_in(&mut file, &header, pace, &mut blocks).await {
+        fail(error);
+    }
+}
+
+#[embassy_executor::task]
+async fn take_in_spi(pace: Pace, mut blocks: Sender<'static, Mutex, Block>) {
+    let flash = match Flash::open(Pl022::start(), AlwaysSelected, 0).await {
+        Ok(flash) => flash,
+        Err(error) => fail(error),
+    };
+    let mut sensor = SpiSensor::new(flash, AlwaysReady);
+    let told = |acquired: &Acquired| ACQUIRED.lock(|cell| cell.set(Some(*acquired)));
+    if let Err(error) = acquire(&mut sensor, pace, &mut blocks, told).await {
         fail(error);
     }
 }
@@ -128,7 +157,6 @@ async fn take_in(
 #[embassy_executor::task]
 async fn measure_all(
     tachometer: &'static mut Tachometer<'static>,
-    header: Header,
     mut blocks: Receiver<'static, Mutex, Block>,
     pace: Pace,
 ) {
@@ -142,6 +170,9 @@ async fn measure_all(
     };
     measure(tachometer, &mut blocks, pace, &mut costs, show).await;
     let mut console = Console::default();
+    if let Some(acquired) = ACQUIRED.lock(Cell::get) {
+        writeln!(console, "{acquired}").ok();
+    }
     writeln!(
         console,
         "{costs}overrun events={}\nmemory tachometer={} store={} heat={} blocks={} stack={}",

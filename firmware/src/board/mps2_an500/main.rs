@@ -1,7 +1,9 @@
 //! The tachometer on QEMU's mps2-an500: events from a file of the host, readings to its console.
 //!
 //! `cargo q -- FILE [sensor]` plays a recording of [`evtach_firmware::record`]s, as fast as it is
-//! measured, or with `sensor` as fast as it was recorded. Exit code 0: a speed was read; 1: none was;
+//! measured, or with `sensor` as fast as it was recorded. `EVTACH_FLASH=STREAM.spi cargo q -- spi [sensor]` reads
+//! what a bridge sends ([`evtach_firmware::sensor::spi`]) through the SPI controller, from a serial flash that holds
+//! it. Exit code 0: a speed was read; 1: none was;
 //! 2: bad usage or input; 101: panic; 102: fault.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
@@ -9,6 +11,10 @@
 mod console;
 #[cfg(target_os = "none")]
 mod device;
+#[cfg(target_os = "none")]
+mod pl022;
+#[cfg(target_os = "none")]
+mod register;
 #[cfg(target_os = "none")]
 mod stack;
 #[cfg(target_os = "none")]

@@ -3,10 +3,9 @@
 //! The dual timer runs through 32 bits at 25 MHz and counts its wraps by interrupt; timer 0 rings
 //! when the next task is due. Arm "Cortex-M System Design Kit" TRM, chapter 4; addresses and interrupts
 //! from Arm's application note AN500.
-#![expect(unsafe_code, reason = "device registers, and the vector table's link to its handlers")]
+#![expect(unsafe_code, reason = "the vector table's link to its handlers")]
 
 use core::cell::RefCell;
-use core::ptr;
 use core::sync::atomic::{AtomicU32, Ordering};
 use core::task::Waker;
 
@@ -20,24 +19,9 @@ use evtach_firmware::cost::Clock;
 /// Timer ticks in a microsecond: the board's 25 MHz.
 const TICKS_PER_US: u64 = 25;
 
-/// A device register.
-struct Register(usize);
-
-impl Register {
-    fn read(&self) -> u32 {
-        // SAFETY: every `Register` below is a readable word of the board's timers.
-        unsafe { ptr::with_exposed_provenance::<u32>(self.0).read_volatile() }
-    }
-
-    fn write(&self, value: u32) {
-        // SAFETY: every `Register` below is a writable word of the board's timers.
-        unsafe { ptr::with_exposed_provenance_mut::<u32>(self.0).write_volatile(value) }
-    }
-}
-
 /// Timer 0: counts down once and rings.
 mod alarm {
-    use super::Register;
+    use crate::register::Register;
 
     pub const CONTROL: Register = Register(0x4000_0000);
     pub const VALUE: Register = Register(0x4000_0004);
@@ -50,7 +34,7 @@ mod alarm {
 
 /// First half of the dual timer: runs freely, downwards.
 mod counter {
-    use super::Register;
+    use crate::register::Register;
 
     pub const LOAD: Register = Register(0x4000_2000);
     pub const VALUE: Register = Register(0x4000_2004);

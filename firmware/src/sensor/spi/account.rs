@@ -72,7 +72,9 @@ impl Account {
         self.frames += 1;
         let before = self.lost.total();
         match self.expected.and_then(|expected| gap(&expected, header)) {
-            Some((frames, events, bridge)) => self.add(frame.damaged_before, frames, events, bridge),
+            Some((frames, events, bridge)) => {
+                self.add(frame.damaged_before, frames, events, bridge)
+            }
             None => self.restarts += u64::from(self.expected.is_some()),
         }
         self.expected = Some(Expected {

@@ -1,6 +1,6 @@
 //! From the sensor to blocks of events, and never late: what finds no place is thinned or dropped, and counted.
 
-use core::mem;
+use core::{fmt, mem};
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_sync::zerocopy_channel::Sender;
@@ -9,7 +9,7 @@ use embedded_hal_async::digital::Wait;
 use embedded_hal_async::spi::SpiDevice;
 use evtach_core::Geometry;
 
-use super::account::Account;
+use super::account::{Account, Lost};
 use super::driver::{LinkError, SILENCE, SpiSensor};
 use super::frame::{Hello, Kind};
 use super::parser::Frame;
@@ -53,6 +53,26 @@ impl Acquired {
     #[must_use]
     pub const fn delivered(&self) -> u64 {
         self.account.received.saturating_sub(self.thinned).saturating_sub(self.overrun)
+    }
+}
+
+/// One line that begins with "acquired": every count under its name.
+impl fmt::Display for Acquired {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { sensor, account, thinned, overrun, bus_errors } = self;
+        let Account { frames, frames_damaged, frames_missing, restarts, received, lost, .. } =
+            account;
+        let Lost { bridge, damaged, missing, undecoded } = lost;
+        write!(
+            f,
+            "acquired sent={} received={received} thinned={thinned} overrun={overrun} \
+             bridge={bridge} damaged={damaged} missing={missing} undecoded={undecoded} frames={frames} \
+             frames_damaged={frames_damaged} frames_missing={frames_missing} restarts={restarts} \
+             bus_errors={bus_errors} sensor={}",
+            account.sent(),
+            // The name stands last, because it may hold spaces.
+            sensor.as_ref().map_or("-", Hello::name),
+        )
     }
 }
 

@@ -2,7 +2,10 @@ use super::*;
 
 /// Events in each frame of a stream.
 fn counts(frames: &[Vec<u8>]) -> Vec<u64> {
-    frames.iter().map(|frame| read(&[&frames[0][..], &frame[..]].concat(), 64).0.len() as u64).collect()
+    frames
+        .iter()
+        .map(|frame| read(&[&frames[0][..], &frame[..]].concat(), 64).0.len() as u64)
+        .collect()
 }
 
 #[test]

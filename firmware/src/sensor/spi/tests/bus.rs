@@ -59,7 +59,10 @@ impl SpiBus for Wire {
 }
 
 impl SpiDevice for Wire {
-    async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
+    async fn transaction(
+        &mut self,
+        operations: &mut [Operation<'_, u8>],
+    ) -> Result<(), Infallible> {
         for operation in operations {
             if let Operation::Read(words) = operation {
                 SpiBus::read(self, words).await?;
@@ -143,9 +146,11 @@ fn a_recording_in_flash_comes_whole() {
             let mut acquired = Acquired::default();
             let told = |now: &Acquired| acquired = *now;
             let playing = acquire(&mut sensor, Pace::File, &mut sender, told);
-            let ((), (received, lost)) =
-                embassy_futures::join::join(async { playing.await.expect("a sound bus") }, all(&mut receiver))
-                    .await;
+            let ((), (received, lost)) = embassy_futures::join::join(
+                async { playing.await.expect("a sound bus") },
+                all(&mut receiver),
+            )
+            .await;
             assert_eq!(lost, 0);
             (received, acquired)
         });
