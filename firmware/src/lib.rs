@@ -19,3 +19,4 @@ pub mod report;
 pub mod scpi;
 pub mod sensor;
 pub mod settings;
+pub mod ui;

@@ -1,6 +1,7 @@
 //! Recordings, synthesiser and reports around `evtach-core`.
 
 pub mod device;
+pub mod frame;
 pub mod measure;
 pub mod recording;
 pub mod report;
