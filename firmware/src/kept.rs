@@ -30,6 +30,9 @@ pub struct KeptFault {
 }
 
 impl KeptFault {
+    /// Room for the message.
+    pub const TEXT_BYTES: usize = TEXT_BYTES;
+
     /// A fault and its message, anything that prints.
     #[must_use]
     pub fn new(fault: Fault, message: impl fmt::Display) -> Self {

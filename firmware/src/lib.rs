@@ -19,4 +19,5 @@ pub mod report;
 pub mod scpi;
 pub mod sensor;
 pub mod settings;
+pub mod tasks;
 pub mod ui;

@@ -3,6 +3,7 @@
 use embassy_futures::yield_now;
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_sync::zerocopy_channel::Receiver;
+use embassy_time::{Duration, with_timeout};
 use evtach_core::{Event, Poll, Reading, Settings, Tachometer};
 use heapless::Vec;
 
@@ -37,13 +38,33 @@ impl<C: Clock> Intake<'_, '_, C> {
     }
 }
 
-/// Measures until the last block, and hands every reading to `show` with what it cost.
+/// What goes on around a measurement: on a board the rest of the device, in a test a list of readings.
+pub trait Companion {
+    /// A block has come.
+    fn arrived(&mut self, _block: &Block) {}
+
+    /// A window has been measured, at this cost.
+    fn measured(&mut self, reading: &Reading, spent: Spent);
+
+    /// Between two steps, and twice a second when nothing comes.
+    fn between(&mut self, _tachometer: &mut Tachometer<'_>) {}
+
+    /// After a step: lets others run.
+    fn rest(&mut self) -> impl Future<Output = ()> {
+        yield_now()
+    }
+}
+
+/// Longest time between two calls of [`Companion::between`] while no events come.
+const IDLE: Duration = Duration::from_millis(500);
+
+/// Measures until the last block.
 pub async fn measure<M: RawMutex>(
     tachometer: &mut Tachometer<'_>,
     blocks: &mut Receiver<'_, M, Block>,
     pace: Pace,
     costs: &mut Costs<impl Clock>,
-    mut show: impl FnMut(&Reading, Spent),
+    companion: &mut impl Companion,
 ) {
     let mut intake = Intake { tachometer, costs, ended: false };
     let mut finished = false;
@@ -51,24 +72,27 @@ pub async fn measure<M: RawMutex>(
         if intake.ended {
             intake.tachometer.finish();
             finished = true;
-        } else {
-            intake.push(blocks.receive().await);
+        } else if let Ok(block) = with_timeout(IDLE, blocks.receive()).await {
+            companion.arrived(block);
+            intake.push(block);
             blocks.receive_done();
         }
         loop {
+            companion.between(intake.tachometer);
             match intake.costs.poll(intake.tachometer, STEPS) {
                 Poll::Idle => break,
                 Poll::Pending => {}
-                Poll::Ready(reading) => show(&reading, intake.costs.take_spent()),
+                Poll::Ready(reading) => companion.measured(&reading, intake.costs.take_spent()),
             }
             // A sensor goes on while a window is measured; a file waits, and is measured to the end.
             while pace != Pace::File
                 && let Some(block) = blocks.try_receive()
             {
+                companion.arrived(block);
                 intake.push(block);
                 blocks.receive_done();
             }
-            yield_now().await;
+            companion.rest().await;
         }
     }
 }

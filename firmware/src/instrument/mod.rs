@@ -23,6 +23,7 @@ pub use number::Number;
 pub use picture::{BRIGHTEST, Picture};
 pub use preferences::{Alarm, Beyond, MAX_BLADES, MAX_TRIM_PPM, Preferences, Unit};
 pub use state::State;
+pub use tally::Collected;
 pub use traffic::{Rate, SATURATION_EV_S, Traffic};
 pub use trend::{TREND_POINTS, Trend, TrendPoint};
 pub use view::{Row, Shown, Statistics, View};
@@ -154,6 +155,32 @@ impl Instrument {
     #[must_use]
     pub const fn preferences(&self) -> &Preferences {
         &self.preferences
+    }
+
+    /// The fault that is shown.
+    #[must_use]
+    pub const fn fault(&self) -> Option<Fault> {
+        self.fault
+    }
+
+    /// Which value the big number shows.
+    #[must_use]
+    pub const fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// The rotor that was asked for; `None`: the instrument chooses.
+    #[must_use]
+    pub const fn chosen(&self) -> Option<u8> {
+        if self.chosen { self.selected } else { None }
+    }
+
+    /// Shows this rotor; `None` leaves the choice to the instrument.
+    pub fn choose(&mut self, rotor: Option<u8>) {
+        match rotor {
+            Some(id) => self.act(Action::Rotor(id)),
+            None => self.chosen = false,
+        }
     }
 
     /// The last readings of the rotor that the big number shows.

@@ -2,7 +2,7 @@
 
 use evtach_core::Reason;
 
-use super::tally::Rpm;
+use super::tally::{Collected, Rpm, Tally};
 use super::{
     Beyond, Instrument, LastSpeed, Mode, Number, Row, Scene, Seen, Sensor, Shown, State,
     Statistics, View, fresh_us,
@@ -84,7 +84,9 @@ impl Instrument {
         (age_us <= seen_us).then_some((last, newest && age_us <= fresh_us))
     }
 
-    fn state(&self) -> State {
+    /// In which state the measurement stands.
+    #[must_use]
+    pub fn state(&self) -> State {
         let scene = self.scene();
         if let Some(fault) = self.fault {
             return State::Fault(fault);
@@ -121,6 +123,12 @@ impl Instrument {
         let sigma = unit.error_of_rpm(rpm.value, rpm.sigma);
         let value = Number::supported(unit.of_rpm(rpm.value), sigma)?;
         Some(Shown { value, error: Number::of_error(sigma)? })
+    }
+
+    /// What has been collected of the rotor that the big number shows, since the last reset.
+    #[must_use]
+    pub fn collected(&self) -> Option<Collected> {
+        self.tallies.of(self.selected?).map(Tally::collected)
     }
 
     fn statistics(&self) -> Option<Statistics> {

@@ -22,6 +22,22 @@ impl Rpm {
     }
 }
 
+/// What has been collected of a rotor since the last reset, every digit of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Collected {
+    /// Largest reading in revolutions per minute.
+    pub max_rpm: f32,
+    /// Smallest reading in revolutions per minute.
+    pub min_rpm: f32,
+    /// Mean of the readings in revolutions per minute.
+    pub mean_rpm: f32,
+    /// Readings.
+    pub readings: u32,
+    /// Revolutions while it was measured, in tenths.
+    pub turns_tenths: u64,
+}
+
 /// One rotor since the last reset.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tally {
@@ -79,6 +95,16 @@ impl Tally {
     /// readings do not make it much smaller.
     pub fn mean(&self) -> Rpm {
         Rpm { value: self.mean_rpm, sigma: evtach_core::math::sqrt(self.mean_variance) }
+    }
+
+    pub const fn collected(&self) -> Collected {
+        Collected {
+            max_rpm: self.max.value,
+            min_rpm: self.min.value,
+            mean_rpm: self.mean_rpm,
+            readings: self.readings,
+            turns_tenths: self.turns_tenths(),
+        }
     }
 
     /// Tenths of revolutions while the rotor was measured.

@@ -18,6 +18,9 @@ pub struct Lost {
 }
 
 impl Lost {
+    /// None.
+    pub const NONE: Self = Self { bridge: 0, damaged: 0, missing: 0, undecoded: 0 };
+
     /// All of them.
     #[must_use]
     pub const fn total(&self) -> u64 {
@@ -65,6 +68,17 @@ const fn ahead(from: u32, to: u32) -> Option<u32> {
 }
 
 impl Account {
+    /// Nothing has come yet.
+    pub const NONE: Self = Self {
+        frames: 0,
+        frames_damaged: 0,
+        frames_missing: 0,
+        restarts: 0,
+        received: 0,
+        lost: Lost::NONE,
+        expected: None,
+    };
+
     /// Takes in the header of a sound frame and returns how many events were lost since the one before. The
     /// frame's own events follow by [`Account::events`].
     pub fn frame(&mut self, frame: &Frame<'_>) -> u64 {

@@ -38,6 +38,8 @@ const MOST_STRIDE_LOG2: u32 = 4;
 pub struct Acquired {
     /// The sensor, while it answers.
     pub sensor: Option<Hello>,
+    /// Sensor time that has been reached, in microseconds.
+    pub latest_us: u64,
     /// What came and what did not.
     pub account: Account,
     /// Events left out evenly, because the blocks were filling up.
@@ -49,6 +51,16 @@ pub struct Acquired {
 }
 
 impl Acquired {
+    /// Nothing has come yet.
+    pub const NONE: Self = Self {
+        sensor: None,
+        latest_us: 0,
+        account: Account::NONE,
+        thinned: 0,
+        overrun: 0,
+        bus_errors: 0,
+    };
+
     /// Events handed on to be measured.
     #[must_use]
     pub const fn delivered(&self) -> u64 {
@@ -59,7 +71,7 @@ impl Acquired {
 /// One line that begins with "acquired": every count under its name.
 impl fmt::Display for Acquired {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { sensor, account, thinned, overrun, bus_errors } = self;
+        let Self { sensor, latest_us: _, account, thinned, overrun, bus_errors } = self;
         let Account { frames, frames_damaged, frames_missing, restarts, received, lost, .. } =
             account;
         let Lost { bridge, damaged, missing, undecoded } = lost;
@@ -166,6 +178,7 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
         }
         let Some(hello) = self.hello else { return };
         self.acquired.sensor = Some(hello);
+        self.acquired.latest_us = frame.header.t_us;
         self.lost += self.acquired.account.frame(frame);
         match (frame.header.kind, self.pace) {
             (Kind::Hello, _) => {}

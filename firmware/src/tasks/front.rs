@@ -1,0 +1,146 @@
+//! What screen and link share: the instrument, and what it does not hold.
+
+use embassy_time::Instant;
+use evtach_core::{Geometry, Reading};
+use heapless::String;
+
+use super::shared::{Shared, Wanted};
+use crate::instrument::{Action, Fault, Instrument, Mode, Preferences, Sensor, Traffic};
+use crate::kept::KeptFault;
+use crate::scpi::{RecorderFailed, RecorderStatus, View};
+
+/// What the recorder's memory belongs to: the board says how it is shared with the task that fills it.
+pub trait Recording {
+    /// What the recorder does.
+    fn status(&self) -> RecorderStatus;
+
+    /// Records the next events, up to so many.
+    fn start(&mut self, geometry: Geometry, events: u32);
+
+    /// Ends the recording.
+    fn stop(&mut self);
+
+    /// Copies the recording from a byte on.
+    ///
+    /// # Errors
+    ///
+    /// When the memory fails.
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), RecorderFailed>;
+}
+
+/// The front of the device: what a person sees and asks, on the screen and over the link.
+pub struct Front<R> {
+    pub(super) shared: &'static Shared,
+    pub(super) instrument: Instrument,
+    pub(super) recording: R,
+    pub(super) serial: &'static str,
+    /// The reading that the screen shows, its speeds corrected by the clock's trim.
+    pub(super) reading: Option<Reading>,
+    pub(super) readings: u32,
+    pub(super) first_us: Option<u64>,
+    pub(super) view: View,
+    /// The words of a fault that has not been acknowledged.
+    words: Option<String<{ KeptFault::TEXT_BYTES }>>,
+    /// What the measurement was last told to look at.
+    told: Wanted,
+    /// Sensor time reached, and when it was.
+    reached: (u64, Instant),
+}
+
+impl<R: Recording> Front<R> {
+    /// The front with what was kept: the preferences, and a fault before the last start.
+    pub fn new(
+        shared: &'static Shared,
+        preferences: Preferences,
+        fault: Option<KeptFault>,
+        recording: R,
+        serial: &'static str,
+    ) -> Self {
+        let mut front = Self {
+            shared,
+            instrument: Instrument::new(preferences),
+            recording,
+            serial,
+            reading: None,
+            readings: 0,
+            first_us: None,
+            view: View::default(),
+            words: None,
+            told: Wanted::default(),
+            reached: (0, Instant::now()),
+        };
+        if let Some(KeptFault { fault, text }) = fault {
+            front.instrument.fail(fault);
+            front.words = Some(text);
+        }
+        front
+    }
+
+    /// What a person sees.
+    pub const fn instrument(&self) -> &Instrument {
+        &self.instrument
+    }
+
+    /// Does what a person asks by touch or button.
+    pub fn act(&mut self, action: Action) {
+        self.instrument.act(action);
+    }
+
+    /// Shows a fault.
+    pub fn fail(&mut self, kept: KeptFault) {
+        self.instrument.fail(kept.fault);
+        self.words = Some(kept.text);
+    }
+
+    /// Takes in what has come from the other tasks.
+    pub fn refresh(&mut self) {
+        let acquired = self.shared.acquired();
+        let sensor = if acquired.sensor.is_some() { Sensor::Present } else { Sensor::Absent };
+        self.instrument.set_sensor(sensor);
+        let now = Instant::now();
+        if acquired.latest_us != self.reached.0 {
+            self.reached = (acquired.latest_us, now);
+        }
+        let since = now.saturating_duration_since(self.reached.1);
+        let lost = acquired.account.lost.total().saturating_add(acquired.overrun);
+        self.instrument.tick(
+            self.reached.0.saturating_add(since.as_micros()),
+            Traffic { events: acquired.account.received, lost },
+        );
+        while let Ok(reading) = self.shared.readings.try_receive() {
+            self.take_in(reading);
+        }
+        if let Ok(picture) = self.shared.taken.try_receive() {
+            self.instrument.show_picture(picture);
+            self.shared.blank.try_send(picture).ok();
+        }
+        let View { roi, window_us } = self.view;
+        let wanted = Wanted { blades: self.instrument.preferences().blades, roi, window_us };
+        if wanted != self.told {
+            self.told = wanted;
+            self.shared.wanted.signal(wanted);
+        }
+    }
+
+    fn take_in(&mut self, mut reading: Reading) {
+        self.instrument.observe(&reading);
+        self.first_us.get_or_insert(reading.t_us.saturating_sub(u64::from(reading.window_us / 2)));
+        if self.instrument.mode() == Mode::Hold {
+            return;
+        }
+        let trim = 1.0 + self.instrument.preferences().clock_trim_ppm * 1e-6;
+        for speed in reading.rotors.iter_mut().filter_map(|rotor| rotor.speed.as_mut()) {
+            speed.omega_rad_s *= trim;
+            speed.omega_sigma_rad_s *= trim;
+            speed.alpha_rad_s2 = speed.alpha_rad_s2.map(|alpha| alpha * trim * trim);
+        }
+        self.reading = Some(reading);
+        self.readings = self.readings.wrapping_add(1);
+    }
+
+    /// The fault that is shown, in its own words.
+    pub(super) fn fault_words(&self) -> Option<(Fault, &str)> {
+        let words = self.words.as_deref().unwrap_or_default();
+        self.instrument.fault().map(|fault| (fault, words))
+    }
+}
