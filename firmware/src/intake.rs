@@ -51,8 +51,31 @@ pub enum Pace {
     File,
     /// As fast as it was recorded: a sensor does not wait, and what finds no free block is lost.
     Sensor,
+    /// As fast as it was recorded, and for a sensor for good: its end is a sensor that went away, and what follows
+    /// one that came back. For bring-up with no camera.
+    Replay,
     /// No recording: as fast as it comes from a sensor.
     Live,
+}
+
+impl Pace {
+    /// Whether what comes can wait for whoever measures.
+    #[must_use]
+    pub const fn can_wait(self) -> bool {
+        matches!(self, Self::File)
+    }
+
+    /// Whether time passes as it did when it was recorded.
+    #[must_use]
+    pub const fn is_timed(self) -> bool {
+        matches!(self, Self::Sensor | Self::Replay)
+    }
+
+    /// Whether there is no end.
+    #[must_use]
+    pub const fn is_endless(self) -> bool {
+        matches!(self, Self::Replay | Self::Live)
+    }
 }
 
 /// A stream of bytes: a file, or a link to a sensor.
@@ -127,14 +150,11 @@ pub async fn take_in<S: Source, M: RawMutex>(
         }
         let first_us = records.first().map_or(0, |record| decoder.decode(*record).t_us);
         let last_us = records.last().map_or(0, |record| decoder.decode(*record).t_us);
-        if pace == Pace::Sensor {
+        if pace.is_timed() {
             let age_us = last_us.saturating_sub(header.first_us);
             Timer::at(start + Duration::from_micros(age_us)).await;
         }
-        let slot = match pace {
-            Pace::File => Some(blocks.send().await),
-            Pace::Sensor | Pace::Live => blocks.try_send(),
-        };
+        let slot = if pace.can_wait() { Some(blocks.send().await) } else { blocks.try_send() };
         if let Some(slot) = slot {
             mem::swap(&mut slot.records, &mut records);
             slot.t_us = first_us;

@@ -85,7 +85,7 @@ pub async fn measure<M: RawMutex>(
                 Poll::Ready(reading) => companion.measured(&reading, intake.costs.take_spent()),
             }
             // A sensor goes on while a window is measured; a file waits, and is measured to the end.
-            while pace != Pace::File
+            while !pace.can_wait()
                 && let Some(block) = blocks.try_receive()
             {
                 companion.arrived(block);

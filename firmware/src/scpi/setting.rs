@@ -183,7 +183,7 @@ pub fn get(setting: Setting, device: &impl Device, out: &mut Response) {
         Setting::Clock => out.number(Some(preferences.clock_trim_ppm)),
         Setting::Limit(side) => {
             let rpm = limit(&preferences, side);
-            out.number(rpm.and_then(|rpm| speed::from_rpm(rpm, preferences.unit)));
+            out.number(rpm.and_then(|rpm| speed::in_unit(rpm, preferences.unit)));
         }
         Setting::LimitState(side) => out.plain(u8::from(limit(&preferences, side).is_some())),
         Setting::Roi => match device.view().roi {

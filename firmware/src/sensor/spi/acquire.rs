@@ -109,7 +109,7 @@ pub async fn acquire<D: SpiDevice, R: Wait, M: RawMutex>(
     loop {
         match sensor.read().await {
             Ok(()) => silent_reads += 1,
-            Err(error) if pace == Pace::Live => outlet.failed(&error),
+            Err(error) if pace.is_endless() => outlet.failed(&error),
             Err(error) => return Err(error),
         }
         while let Some(frame) = sensor.next_frame() {
@@ -117,12 +117,12 @@ pub async fn acquire<D: SpiDevice, R: Wait, M: RawMutex>(
             silent_reads = 0;
             outlet.take(&frame).await;
         }
-        if outlet.ended || (pace != Pace::Live && silent_reads > SILENT_READS) {
+        if outlet.ended || (!pace.is_endless() && silent_reads > SILENT_READS) {
             outlet.close().await;
             told(&outlet.acquired);
             return Ok(());
         }
-        if silent_reads > 0 && pace == Pace::Live {
+        if silent_reads > 0 && pace.is_endless() {
             if heard.elapsed() > SILENCE {
                 outlet.acquired.sensor = None;
             }
@@ -180,11 +180,14 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
         self.acquired.sensor = Some(hello);
         self.acquired.latest_us = frame.header.t_us;
         self.lost += self.acquired.account.frame(frame);
-        match (frame.header.kind, self.pace) {
-            (Kind::Hello, _) => {}
-            (Kind::End, Pace::Live) => self.acquired.sensor = None,
-            (Kind::End, _) => self.ended = true,
-            (Kind::Evt2 | Kind::Evt3, _) => {
+        match frame.header.kind {
+            Kind::Hello => {}
+            Kind::End => {
+                self.acquired.sensor = None;
+                self.origin = None;
+                self.ended = !self.pace.is_endless();
+            }
+            Kind::Evt2 | Kind::Evt3 => {
                 self.keep_pace(frame.header.t_us).await;
                 self.deliver(frame, hello.geometry).await;
             }
@@ -193,7 +196,7 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
 
     /// Waits until a recording that is played as fast as it was recorded has come to this time.
     async fn keep_pace(&mut self, t_us: u64) {
-        if self.pace == Pace::Sensor {
+        if self.pace.is_timed() {
             let (start, first_us) = *self.origin.get_or_insert_with(|| (Instant::now(), t_us));
             let due = start.checked_add(Duration::from_micros(t_us.saturating_sub(first_us)));
             Timer::at(due.unwrap_or(Instant::MAX)).await;
@@ -205,12 +208,11 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
         let mut words = Words::new(frame);
         let mut events = 0_u32;
         while !words.is_done() {
-            let slot = match self.pace {
-                Pace::File => Some(self.blocks.send().await),
-                Pace::Sensor | Pace::Live => {
-                    self.thin_by_crowd();
-                    self.blocks.try_send()
-                }
+            let slot = if self.pace.can_wait() {
+                Some(self.blocks.send().await)
+            } else {
+                self.thin_by_crowd();
+                self.blocks.try_send()
             };
             let Some(slot) = slot else {
                 let before = events;
