@@ -37,7 +37,8 @@ impl Block {
     pub const EMPTY: Self = Self {
         records: Vec::new(),
         t_us: 0,
-        geometry: Geometry { width_px: 1, height_px: 1 },
+        // All zeros, so that the blocks need no image in flash.
+        geometry: Geometry { width_px: 0, height_px: 0 },
         lost: 0,
         last: false,
     };

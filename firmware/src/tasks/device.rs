@@ -2,11 +2,11 @@
 
 use evtach_core::{Geometry, Reading, Reason};
 
-use super::front::{Front, Recording};
+use super::front::{Front, Panel, Recording};
 use crate::instrument::{Action, Fault, Mode, Preferences, Sensor, State};
 use crate::scpi::{Device, Identity, RecorderFailed, RecorderStatus, Statistics, View};
 
-impl<R: Recording> Device for Front<R> {
+impl<R: Recording, P: Panel> Device for Front<R, P> {
     fn identity(&self) -> Identity<'_> {
         Identity { serial: self.serial, version: env!("CARGO_PKG_VERSION") }
     }

@@ -1,6 +1,8 @@
 //! What screen and link share: the instrument, and what it does not hold.
 
 use embassy_time::Instant;
+use embedded_graphics::pixelcolor::Rgb565;
+use embedded_graphics::prelude::DrawTarget;
 use evtach_core::{Geometry, Reading};
 use heapless::String;
 
@@ -28,11 +30,18 @@ pub trait Recording {
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), RecorderFailed>;
 }
 
+/// What is drawn on, and may be read back.
+pub trait Panel: DrawTarget<Color = Rgb565> {
+    /// The pixels, row by row, two bytes each, little-endian.
+    fn bytes(&self) -> &[u8];
+}
+
 /// The front of the device: what a person sees and asks, on the screen and over the link.
-pub struct Front<R> {
+pub struct Front<R, P> {
     pub(super) shared: &'static Shared,
     pub(super) instrument: Instrument,
     pub(super) recording: R,
+    pub(super) panel: P,
     pub(super) serial: &'static str,
     /// The reading that the screen shows, its speeds corrected by the clock's trim.
     pub(super) reading: Option<Reading>,
@@ -47,19 +56,21 @@ pub struct Front<R> {
     reached: (u64, Instant),
 }
 
-impl<R: Recording> Front<R> {
+impl<R: Recording, P: Panel> Front<R, P> {
     /// The front with what was kept: the preferences, and a fault before the last start.
     pub fn new(
         shared: &'static Shared,
         preferences: Preferences,
         fault: Option<KeptFault>,
         recording: R,
+        panel: P,
         serial: &'static str,
     ) -> Self {
         let mut front = Self {
             shared,
             instrument: Instrument::new(preferences),
             recording,
+            panel,
             serial,
             reading: None,
             readings: 0,

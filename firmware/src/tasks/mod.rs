@@ -16,7 +16,7 @@ mod measuring;
 mod run;
 mod shared;
 
-pub use front::{Front, Recording};
+pub use front::{Front, Panel, Recording};
 pub use measuring::Measuring;
 pub use run::{link, save, show};
 pub use shared::{Shared, Task, Wanted};

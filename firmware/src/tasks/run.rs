@@ -4,12 +4,10 @@ use core::cell::RefCell;
 
 use embassy_futures::select::select;
 use embassy_time::{Duration, Instant, Ticker, Timer};
-use embedded_graphics::pixelcolor::Rgb565;
-use embedded_graphics::prelude::DrawTarget;
 use embedded_io_async::{Read, Write};
 use embedded_storage_async::nor_flash::NorFlash;
 
-use super::front::{Front, Recording};
+use super::front::{Front, Panel, Recording};
 use super::shared::{Shared, Task};
 use crate::instrument::{Fault, Preferences};
 use crate::kept::KeptFault;
@@ -31,10 +29,9 @@ const HUNG: Duration = Duration::from_secs(2);
 
 /// Draws four times a second what the instrument shows, and feeds the watchdog while every task is alive; with one that is
 /// not, `hung` is told which.
-pub async fn show<R: Recording, D: DrawTarget<Color = Rgb565>>(
-    front: &RefCell<Front<R>>,
+pub async fn show<R: Recording, P: Panel>(
+    front: &RefCell<Front<R, P>>,
     shared: &Shared,
-    target: &RefCell<D>,
     mut feed: impl FnMut(),
     mut hung: impl FnMut(Task),
 ) {
@@ -42,10 +39,12 @@ pub async fn show<R: Recording, D: DrawTarget<Color = Rgb565>>(
     let mut screen = Screen::new();
     let mut last_alive = Instant::now();
     loop {
-        front.borrow_mut().refresh();
-        let target = &mut *target.borrow_mut();
-        // A screen that fails is drawn whole the next time.
-        screen.draw(target, front.borrow().instrument()).ok();
+        {
+            let front = &mut *front.borrow_mut();
+            front.refresh();
+            // A panel that fails is drawn whole the next time.
+            screen.draw(&mut front.panel, &front.instrument).ok();
+        }
         if shared.all_alive() {
             last_alive = Instant::now();
         } else if last_alive.elapsed() > HUNG
@@ -59,10 +58,10 @@ pub async fn show<R: Recording, D: DrawTarget<Color = Rgb565>>(
 }
 
 /// Answers on a port. One that fails is tried again.
-pub async fn link<R: Recording, P: Read + Write>(
-    front: &RefCell<Front<R>>,
+pub async fn link<R: Recording, P: Panel>(
+    front: &RefCell<Front<R, P>>,
     shared: &Shared,
-    port: &mut P,
+    port: &mut (impl Read + Write),
 ) {
     let mut link = Link::new();
     let mut bytes = [0; 64];
@@ -87,8 +86,8 @@ pub async fn link<R: Recording, P: Read + Write>(
 }
 
 /// Lets the link work, and sends what it has to say.
-async fn answer<R: Recording>(
-    front: &RefCell<Front<R>>,
+async fn answer<R: Recording, P: Panel>(
+    front: &RefCell<Front<R, P>>,
     shared: &Shared,
     port: &mut impl Write,
     link: &mut Link,
@@ -109,9 +108,9 @@ async fn answer<R: Recording>(
 }
 
 /// Keeps the preferences as they change.
-pub async fn save<R: Recording, F: NorFlash>(
-    front: &RefCell<Front<R>>,
-    store: &mut Store<F>,
+pub async fn save<R: Recording, P: Panel>(
+    front: &RefCell<Front<R, P>>,
+    store: &mut Store<impl NorFlash>,
     mut saved: Preferences,
 ) {
     loop {

@@ -40,6 +40,7 @@ impl Screen {
     /// # Errors
     ///
     /// Whatever the target reports; then everything is drawn the next time.
+    #[inline(never)]
     pub fn draw<D: DrawTarget<Color = Rgb565>>(
         &mut self,
         target: &mut D,

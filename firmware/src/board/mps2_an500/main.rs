@@ -8,17 +8,35 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
+mod bench;
+#[cfg(target_os = "none")]
 mod console;
 #[cfg(target_os = "none")]
 mod device;
 #[cfg(target_os = "none")]
+mod fault;
+#[cfg(target_os = "none")]
+mod injection;
+#[cfg(target_os = "none")]
+mod memory;
+#[cfg(target_os = "none")]
 mod pl022;
+#[cfg(target_os = "none")]
+mod program;
+#[cfg(target_os = "none")]
+mod psram;
 #[cfg(target_os = "none")]
 mod register;
 #[cfg(target_os = "none")]
 mod stack;
 #[cfg(target_os = "none")]
 mod timers;
+#[cfg(target_os = "none")]
+mod uart;
+#[cfg(target_os = "none")]
+mod usage;
+#[cfg(target_os = "none")]
+mod watchdog;
 
 #[cfg(not(target_os = "none"))]
 fn main() {

@@ -6,6 +6,9 @@
 # 216 MHz of the STM32F746. EVTACH_ICOUNT_SHIFT chooses.
 #
 # EVTACH_FLASH names a file of at most 16 MiB that stands in a serial flash behind the SPI controller.
+#
+# EVTACH_SERIAL names where the serial port leads, in QEMU's words: pty, tcp::5025,server=on,wait=off, ... Then the
+# board's time keeps to that of the world. Without it the port is not connected and time flies while the board sleeps.
 set -euo pipefail
 image=$1
 shift
@@ -22,5 +25,7 @@ if [ -n "${EVTACH_FLASH:-}" ]; then
   truncate -s 16M "$chip"
   options+=(-drive "if=none,id=flash,format=raw,file=$chip" -device n25q128a11,drive=flash)
 fi
-qemu-system-arm -machine mps2-an500 -icount "shift=${EVTACH_ICOUNT_SHIFT:-0},sleep=off" \
-  -display none -monitor none -serial none "${options[@]}" -semihosting-config "$config" -kernel "$image"
+sleep=off
+[ -z "${EVTACH_SERIAL:-}" ] || sleep=on
+qemu-system-arm -machine mps2-an500 -icount "shift=${EVTACH_ICOUNT_SHIFT:-0},sleep=$sleep" \
+  -display none -monitor none -serial "${EVTACH_SERIAL:-none}" "${options[@]}" -semihosting-config "$config" -kernel "$image"

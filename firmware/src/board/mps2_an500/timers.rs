@@ -49,14 +49,18 @@ mod counter {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u16)]
 pub enum Irq {
+    /// UART 0 has received a byte.
+    Receive = 0,
     /// Timer 0.
     Alarm = 8,
     /// Dual timer.
     Counter = 10,
-    /// A pin's interrupt that nothing is wired to: runs the measurement by software.
+    /// A pin's interrupt that nothing is wired to: runs screen and link, by software.
+    Front = 29,
+    /// Another of them: runs the measurement.
     Measure = 30,
-    /// Another of them: runs the intake.
-    Intake = 31,
+    /// Another: reads the sensor.
+    Acquire = 31,
 }
 
 // SAFETY: the numbers are those of the board's vector table.
@@ -69,12 +73,19 @@ unsafe impl InterruptNumber for Irq {
 impl Irq {
     /// The interrupt of this number, when it is one of these.
     pub fn from_number(number: i16) -> Option<Self> {
-        [Self::Alarm, Self::Counter, Self::Measure, Self::Intake]
+        [
+            Self::Receive,
+            Self::Alarm,
+            Self::Counter,
+            Self::Front,
+            Self::Measure,
+            Self::Acquire,
+        ]
             .into_iter()
             .find(|irq| *irq as i16 == number)
     }
 
-    /// Lower is more urgent: time before intake before measuring.
+    /// Lower is more urgent: time, then acquiring, measuring, screen and link.
     pub fn set_priority(self, nvic: &mut NVIC, priority: u8) {
         // SAFETY: no critical section here rests on a priority; they all mask every interrupt.
         unsafe { nvic.set_priority(self, priority) }

@@ -182,11 +182,11 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
         self.lost += self.acquired.account.frame(frame);
         match frame.header.kind {
             Kind::Hello => {}
-            Kind::End => {
+            Kind::End if self.pace.is_endless() => {
                 self.acquired.sensor = None;
                 self.origin = None;
-                self.ended = !self.pace.is_endless();
             }
+            Kind::End => self.ended = true,
             Kind::Evt2 | Kind::Evt3 => {
                 self.keep_pace(frame.header.t_us).await;
                 self.deliver(frame, hello.geometry).await;
