@@ -53,7 +53,7 @@ pub async fn take_in_spi(pace: Pace, mut blocks: Sender<'static, Mutex, Block>) 
 }
 
 /// What a person would have seen: drawn after every reading, by event time alone, so that the PC draws the same.
-struct Film {
+pub struct Film {
     instrument: Instrument,
     screen: Screen,
     picture: Picture,
@@ -96,6 +96,13 @@ impl Film {
     }
 }
 
+/// Readies the screen, in external memory. Not inlined, because it is built on the stack first.
+#[inline(never)]
+pub fn film(psram: Psram) -> &'static mut Film {
+    let Psram { panel, scratch, .. } = psram;
+    scratch.put(Film::new(panel))
+}
+
 /// Prints readings as they come.
 struct Printer {
     console: Console,
@@ -125,9 +132,8 @@ pub async fn measure_all(
     tachometer: &'static mut Tachometer<'static>,
     mut blocks: Receiver<'static, Mutex, Block>,
     pace: Pace,
-    screen: Option<Psram>,
+    film: Option<&'static mut Film>,
 ) {
-    let film = screen.map(|Psram { panel, scratch, .. }| scratch.put(Film::new(panel)));
     let mut printer = Printer { console: Console::default(), seen_speed: false, film };
     let mut costs = Costs::new(Ticks);
     measure(tachometer, &mut blocks, pace, &mut costs, &mut printer).await;
@@ -139,6 +145,7 @@ pub async fn measure_all(
     if let Some(acquired) = ACQUIRED.lock(Cell::get) {
         writeln!(console, "{acquired}").ok();
     }
+    let (start_depth, run_depth) = stack::depths();
     writeln!(
         console,
         "{costs}overrun events={}\nmemory tachometer={} store={} heat={} blocks={} stack={}",
@@ -147,7 +154,7 @@ pub async fn measure_all(
         memory::STORE_BYTES,
         memory::HEAT_BYTES,
         memory::BLOCKS_BYTES,
-        stack::deepest(),
+        start_depth.max(run_depth),
     )
     .ok();
     console.flush();

@@ -17,7 +17,7 @@ use crate::fault::fail;
 use crate::injection::Injection;
 use crate::timers::{self, Irq};
 use crate::usage::{User, charge};
-use crate::{bench, memory, program, psram, uart};
+use crate::{bench, memory, program, psram, stack, uart};
 
 static ACQUIRE: InterruptExecutor = InterruptExecutor::new();
 static MEASURE: InterruptExecutor = InterruptExecutor::new();
@@ -68,13 +68,17 @@ fn main() -> ! {
     }
 }
 
+// Neither is inlined: `main` never gives back what its frame takes.
+#[inline(never)]
 fn start_bench(
     file: Option<File>,
     How { pace, screen }: How,
 ) -> Result<(), embassy_executor::SpawnError> {
     let (sender, receiver) = memory::blocks();
     let psram = if screen { psram::take() } else { None };
-    let measure = bench::measure_all(memory::tachometer(), receiver, pace, psram)?;
+    let film = psram.map(bench::film);
+    let measure = bench::measure_all(memory::tachometer(), receiver, pace, film)?;
+    cortex_m::interrupt::free(|_| stack::start_running());
     MEASURE.start(Irq::Measure).spawn(measure);
     let acquire = ACQUIRE.start(Irq::Acquire);
     match file {
@@ -84,6 +88,7 @@ fn start_bench(
     Ok(())
 }
 
+#[inline(never)]
 fn start_instrument(
     nvic: &mut NVIC,
     injection: Injection,
@@ -93,6 +98,7 @@ fn start_instrument(
     let parts = program::prepare(psram, injection);
     let (sender, receiver) = memory::blocks();
     let (tachometer, injection) = (memory::tachometer(), parts.injection);
+    cortex_m::interrupt::free(|_| stack::start_running());
     let front = FRONT.start(Irq::Front);
     front.spawn(program::front_task(parts)?);
     if let Some(seconds) = seconds {
@@ -107,6 +113,7 @@ fn start_instrument(
 }
 
 /// What the command line asks for; without one, to be the instrument.
+#[inline(never)]
 fn command_line() -> Asked {
     let Ok(arguments) = env::args::<PATH_BYTES>() else { fail("the command line is too long") };
     let mut arguments = (&arguments).skip(1).map(|argument| argument.unwrap_or_default());

@@ -88,7 +88,9 @@ pub struct Parts {
     pub injection: Injection,
 }
 
-/// Reads what was kept over power-off and reset, and makes the front.
+/// Reads what was kept over power-off and reset, and makes the front. Not inlined, because that is built on the stack
+/// first.
+#[inline(never)]
 pub fn prepare(psram: Psram, injection: Injection) -> Parts {
     static FRONT: StaticCell<RefCell<Front<Tape, Panel>>> = StaticCell::new();
     static PICTURE: ConstStaticCell<Picture> = ConstStaticCell::new(Picture::EMPTY);
@@ -118,11 +120,11 @@ pub async fn report_task(seconds: u32) {
     for ((_, name), (after, before)) in USERS.iter().zip(after.iter().zip(before)) {
         writeln!(console, "used ticks={} name={name}", after - before).ok();
     }
+    let (starting, running) = stack::depths();
+    let acquired = SHARED.acquired();
     writeln!(
         console,
-        "{}\nran seconds={seconds} stack={}",
-        SHARED.acquired(),
-        stack::deepest()
+        "{acquired}\nran seconds={seconds} stack_starting={starting} stack_running={running}"
     )
     .ok();
     console.flush();
