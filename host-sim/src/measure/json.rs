@@ -137,8 +137,9 @@ impl ReadingRow {
     #[must_use]
     pub fn new(reading: &Reading, first_us: u64) -> Self {
         Self {
-            t_s: reading.t_us.saturating_sub(first_us) as f64 * 1e-6,
-            window_s: f64::from(reading.window_us) * 1e-6,
+            // Divided, so that the number is the one nearest to its six decimals, as the device writes it.
+            t_s: reading.t_us.saturating_sub(first_us) as f64 / 1e6,
+            window_s: f64::from(reading.window_us) / 1e6,
             status: reading.status.as_str(),
             reason: reason(reading.status),
             rotors: reading.rotors.iter().map(RotorRow::new).collect(),
