@@ -198,10 +198,7 @@ mod tests {
         recorder.read(0, &mut file).expect("memory");
         let (header, body) = file.split_at(Header::BYTES);
         let header = Header::parse(header.try_into().expect("its length")).expect("a header");
-        assert_eq!(
-            header,
-            Header { geometry: GEOMETRY, first_us: 5_000_000_000, events: 4 }
-        );
+        assert_eq!(header, Header { geometry: GEOMETRY, first_us: 5_000_000_000, events: 4 });
         let mut decoder = record::Decoder::new(header.first_us);
         let found: Vec<Event> =
             body.as_chunks().0.iter().map(|&record| decoder.decode(record)).collect();

@@ -90,9 +90,12 @@ fn a_session_as_a_person_types_it() {
         ("FETC:TIME?;WIND?;EVEN?", "1.234567;0.150000;1000,20,3\n"),
         ("FETC:ROT?", "2,A,C\n"),
         ("FETC:POS?", "165.25,150.0,52.123455\n"),
-        ("UNIT HZ;UNIT?", "HZ\n"),
-        ("UNIT:SPE RADS;:FETC?", "314.15927\n"),
-        ("FETC:ALL?", "2,A,314.15927,0.0125,CW,5,\"locked\",C,9.91E+37,9.91E+37,NONE,9.91E+37,\"refused\"\n"),
+        ("UNIT HZ;UNIT?;:FETC?", "HZ;50.0\n"),
+        ("UNIT:SPE MS;:FETC?", "20.0\n"),
+        (
+            "FETC:ALL?",
+            "2,A,20.0,0.00079577486,CW,5,\"locked\",C,9.91E+37,9.91E+37,NONE,9.91E+37,\"refused\"\n",
+        ),
         ("SENS:BLAD 3;:BLAD?", "3\n"),
         ("BLADES AUTO;BLADES?", "AUTO\n"),
         ("SENS:CORR:CLOC -12.5 PPM;CLOC?", "-12.5\n"),
@@ -111,7 +114,10 @@ fn a_session_as_a_person_types_it() {
         ("*WAI;*OPC;*TST?", "0\n"),
         ("", ""),
         (" \r", ""),
-        ("SYST:ERR?", "-113,\"Undefined header;byte 9: SYSTem:HELP:HEADers? lists the commands\"\n"),
+        (
+            "SYST:ERR?",
+            "-113,\"Undefined header;byte 9: SYSTem:HELP:HEADers? lists the commands\"\n",
+        ),
         ("SYST:ERR:COUN?;NEXT?", "0;0,\"No error\"\n"),
     ] {
         assert_eq!(session.ask(line), answer, "{line}");
@@ -365,13 +371,9 @@ fn reset_keeps_the_calibration() {
 fn statistics_are_collected_elsewhere_and_told_here() {
     let mut session = Session::new();
     assert_eq!(session.ask("CALC:AVER:MAX?;COUN?"), "9.91E+37;0\n");
-    session.bench.statistics = Some(Statistics {
-        max_rad_s: 110.0,
-        min_rad_s: 90.0,
-        mean_rad_s: 100.0,
-        readings: 7,
-    });
-    let answer = session.ask("UNIT RADS;:CALC:AVER:MAX?;MIN?;AVER?;COUN?;REV?;CLE;COUN?");
+    session.bench.statistics =
+        Some(Statistics { max_rpm: 6600.0, min_rpm: 5400.0, mean_rpm: 6000.0, readings: 7 });
+    let answer = session.ask("UNIT HZ;:CALC:AVER:MAX?;MIN?;AVER?;COUN?;REV?;CLE;COUN?");
     assert_eq!(answer, "110.0;90.0;100.0;7;12.5;0\n");
 }
 
@@ -402,7 +404,7 @@ fn the_longest_log_line_and_answer_fit() {
             let speed = Speed {
                 omega_rad_s: -12_345.678,
                 omega_sigma_rad_s: 1.234_567_8e-3,
-                alpha_rad_s2: Some(-9_876.543_2),
+                alpha_rad_s2: Some(-9_876.543),
                 frame: Frame::Camera,
             };
             RotorReading {

@@ -16,12 +16,12 @@ pub struct Identity<'d> {
 /// What has been collected since it was last cleared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Statistics {
-    /// Fastest, in rad/s.
-    pub max_rad_s: f32,
-    /// Slowest, in rad/s.
-    pub min_rad_s: f32,
-    /// Mean, in rad/s.
-    pub mean_rad_s: f32,
+    /// Fastest, in revolutions per minute.
+    pub max_rpm: f32,
+    /// Slowest, in revolutions per minute.
+    pub min_rpm: f32,
+    /// Mean, in revolutions per minute.
+    pub mean_rpm: f32,
     /// Readings within.
     pub readings: u32,
 }
@@ -73,7 +73,8 @@ pub trait Device {
     /// Whether a sensor answers.
     fn sensor(&self) -> Sensor;
 
-    /// The reading that the screen shows, held or live; `None` while it shows none.
+    /// The reading that the screen shows, held or live, its speeds corrected by the clock's trim; `None` while it
+    /// shows none.
     fn reading(&self) -> Option<&Reading>;
 
     /// Why the screen shows no reading.

@@ -40,7 +40,7 @@ fn find(reading: &Reading, wanted: Option<u8>) -> Option<&RotorReading> {
 }
 
 fn speed_of(rotor: Option<&RotorReading>, unit: Unit) -> Option<f32> {
-    rotor?.speed.as_ref().and_then(|found| speed::in_unit(found.omega_rad_s, unit))
+    rotor?.speed.as_ref().and_then(|found| speed::in_unit(found.rpm(), unit))
 }
 
 /// The speed of a rotor in the unit chosen, as `FETCh?`, `READ?` and `MEASure?` answer it.
@@ -75,10 +75,7 @@ pub fn fetch(
     device: &impl Device,
     out: &mut Response,
 ) -> Result<(), ScpiError> {
-    let whole = matches!(
-        item,
-        Item::All | Item::Rotors | Item::Time | Item::Window | Item::Events
-    );
+    let whole = matches!(item, Item::All | Item::Rotors | Item::Time | Item::Window | Item::Events);
     let asked = if whole { None } else { rotor_parameter(parameters)? };
     parameters.end()?;
     let unit = device.preferences().unit;
@@ -115,7 +112,7 @@ pub fn fetch(
             for rotor in rotors {
                 let found = rotor.speed.as_ref();
                 out.plain(Letter(rotor.id));
-                out.number(found.and_then(|found| speed::in_unit(found.omega_rad_s, unit)));
+                out.number(found.and_then(|found| speed::in_unit(found.rpm(), unit)));
                 out.number(found.and_then(|found| speed::sigma_in_unit(found, unit)));
                 out.plain(direction(Some(rotor)));
                 match rotor.blades {
@@ -162,14 +159,14 @@ fn direction(rotor: Option<&RotorReading>) -> &'static str {
 pub fn collected(item: Collected, device: &impl Device, out: &mut Response) {
     let statistics = device.statistics();
     let unit = device.preferences().unit;
-    let rad_s = match item {
+    let rpm = match item {
         Collected::Count => {
             return out.plain(statistics.map_or(0, |statistics| statistics.readings));
         }
         Collected::Revolutions => return out.number(device.revolutions()),
-        Collected::Maximum => statistics.map(|statistics| statistics.max_rad_s),
-        Collected::Minimum => statistics.map(|statistics| statistics.min_rad_s),
-        Collected::Average => statistics.map(|statistics| statistics.mean_rad_s),
+        Collected::Maximum => statistics.map(|statistics| statistics.max_rpm),
+        Collected::Minimum => statistics.map(|statistics| statistics.min_rpm),
+        Collected::Average => statistics.map(|statistics| statistics.mean_rpm),
     };
-    out.number(rad_s.and_then(|rad_s| speed::in_unit(rad_s, unit)));
+    out.number(rpm.and_then(|rpm| speed::in_unit(rpm, unit)));
 }

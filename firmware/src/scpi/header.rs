@@ -174,9 +174,19 @@ mod tests {
 
     #[test]
     fn nothing_between_short_and_long() {
-        for header in
-            ["MEASU?", "MEA?", "MEAS", "MEAS:?", ":MEAS?", "MEAS::SPE?", "?", "", "SENS", "BLADES:X", "*IDN"]
-        {
+        for header in [
+            "MEASU?",
+            "MEA?",
+            "MEAS",
+            "MEAS:?",
+            ":MEAS?",
+            "MEAS::SPE?",
+            "?",
+            "",
+            "SENS",
+            "BLADES:X",
+            "*IDN",
+        ] {
             assert_eq!(found(header), Err(ErrorCode::UndefinedHeader), "{header}");
         }
         assert_eq!(found("MEAS2?"), Err(ErrorCode::HeaderSuffix));

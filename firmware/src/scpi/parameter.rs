@@ -82,7 +82,8 @@ impl<'l> Unit<'l> {
             Some(_) => return Err(ScpiError::at(ErrorCode::InvalidCharacter, at + length)),
         }
         let blank = trim(rest).is_empty();
-        let parameters = Parameters { rest: if blank { None } else { Some(rest) }, at: at + length };
+        let parameters =
+            Parameters { rest: if blank { None } else { Some(rest) }, at: at + length };
         Ok(Self { header, at, parameters })
     }
 }
@@ -115,7 +116,9 @@ impl<'l> Parameters<'l> {
         let place = self.at + white;
         self.rest = rest.get(whole.len() + 1..);
         self.at += whole.len() + usize::from(self.rest.is_some());
-        parse(trim(whole)).map(|parameter| Some((parameter, place))).map_err(|code| ScpiError::at(code, place))
+        parse(trim(whole))
+            .map(|parameter| Some((parameter, place)))
+            .map_err(|code| ScpiError::at(code, place))
     }
 
     /// The next parameter, which must be there.
@@ -218,9 +221,8 @@ fn radix(digits: &[u8], radix: u32) -> Result<Parameter<'_>, ErrorCode> {
 
 /// A decimal number, in which blanks may stand before the unit.
 fn number(text: &[u8]) -> Result<Parameter<'_>, ErrorCode> {
-    let digits = |from: usize| {
-        from + text[from..].iter().take_while(|byte| byte.is_ascii_digit()).count()
-    };
+    let digits =
+        |from: usize| from + text[from..].iter().take_while(|byte| byte.is_ascii_digit()).count();
     let mut end = digits(usize::from(matches!(text.first(), Some(b'+' | b'-'))));
     if text.get(end) == Some(&b'.') {
         end = digits(end + 1);
@@ -242,7 +244,11 @@ fn number(text: &[u8]) -> Result<Parameter<'_>, ErrorCode> {
         .ok()
         .and_then(|value| value.parse::<f32>().ok())
         .ok_or(ErrorCode::NumericData)?;
-    if value.is_finite() { Ok(Parameter::Number(value, unit)) } else { Err(ErrorCode::DataOutOfRange) }
+    if value.is_finite() {
+        Ok(Parameter::Number(value, unit))
+    } else {
+        Err(ErrorCode::DataOutOfRange)
+    }
 }
 
 #[cfg(test)]

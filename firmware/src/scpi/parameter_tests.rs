@@ -18,11 +18,10 @@ fn only(text: &str) -> Result<Parameter<'_>, ErrorCode> {
 fn commands_and_their_places() {
     let found = units(b" *IDN? ;; UNIT\tHZ;:CALC:LIM:UPP 1,2 ; ");
     let found: Vec<_> = found.iter().map(|unit| unit.as_ref().expect("a command")).collect();
-    assert_eq!(found.iter().map(|unit| unit.header).collect::<Vec<_>>(), [
-        b"*IDN?".as_slice(),
-        b"UNIT",
-        b":CALC:LIM:UPP"
-    ]);
+    assert_eq!(
+        found.iter().map(|unit| unit.header).collect::<Vec<_>>(),
+        [b"*IDN?".as_slice(), b"UNIT", b":CALC:LIM:UPP"]
+    );
     assert_eq!(found.iter().map(|unit| unit.at).collect::<Vec<_>>(), [1, 10, 18]);
     let mut parameters = found[2].parameters;
     assert_eq!(parameters.next(), Ok(Some((Parameter::Number(1.0, b""), 32))));

@@ -28,9 +28,7 @@ pub fn run(
             if device.geometry().is_none() {
                 return Err(error(ErrorCode::SettingsConflict));
             }
-            device
-                .start_recording(wanted)
-                .map_err(|RecorderFailed| error(ErrorCode::Hardware))?;
+            device.start_recording(wanted).map_err(|RecorderFailed| error(ErrorCode::Hardware))?;
         }
         Record::Stop => device.stop_recording(),
         Record::State => out.plain(match status.state {

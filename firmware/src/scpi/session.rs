@@ -99,10 +99,7 @@ impl Session {
         let flag = |bit, set| if set { bit } else { 0 };
         self.status.operation.update(
             flag(operation::MEASURING, reading.is_some())
-                | flag(
-                    operation::RECORDING,
-                    device.recorder().state == RecorderState::Running,
-                )
+                | flag(operation::RECORDING, device.recorder().state == RecorderState::Running)
                 | flag(
                     operation::LOCKED,
                     reading.is_some_and(|reading| reading.status == evtach_core::Status::Locked),

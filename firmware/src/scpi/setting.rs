@@ -129,9 +129,8 @@ fn set_roi(parameters: &mut Parameters<'_>, device: &mut impl Device) -> Result<
         Parameter::Number(..) => {
             let mut side = || parameters.integer(evtach_core::Geometry::MAX_PX);
             let (x, y, width_px, height_px) = (side()?, side()?, side()?, side()?);
-            let geometry = device
-                .geometry()
-                .ok_or(ScpiError::at(ErrorCode::SettingsConflict, place))?;
+            let geometry =
+                device.geometry().ok_or(ScpiError::at(ErrorCode::SettingsConflict, place))?;
             if width_px == 0
                 || height_px == 0
                 || x + width_px > geometry.width_px
@@ -184,7 +183,7 @@ pub fn get(setting: Setting, device: &impl Device, out: &mut Response) {
         Setting::Clock => out.number(Some(preferences.clock_trim_ppm)),
         Setting::Limit(side) => {
             let rpm = limit(&preferences, side);
-            out.number(rpm.and_then(|rpm| speed::from_rpm(rpm, preferences.unit)));
+            out.number(rpm.and_then(|rpm| speed::in_unit(rpm, preferences.unit)));
         }
         Setting::LimitState(side) => out.plain(u8::from(limit(&preferences, side).is_some())),
         Setting::Roi => match device.view().roi {

@@ -1,7 +1,5 @@
 //! Speeds in the unit that the person chose.
 
-use core::f32::consts::TAU;
-
 use evtach_core::Speed;
 
 use super::error::ErrorCode;
@@ -41,29 +39,6 @@ pub fn unit(name: &[u8]) -> Option<Unit> {
     named(name).filter(|&(_, scale)| scale == 1.0).map(|(unit, _)| unit)
 }
 
-/// A magnitude in rad/s in this unit; `None` for the time of a turn at rest.
-#[must_use]
-pub fn in_unit(rad_s: f32, unit: Unit) -> Option<f32> {
-    let rad_s = rad_s.abs();
-    match unit {
-        Unit::Rpm => Some(rad_s * Speed::RPM_PER_RAD_S),
-        Unit::Hertz => Some(rad_s / TAU),
-        Unit::RadPerS => Some(rad_s),
-        Unit::MsPerTurn => (rad_s > 0.0).then(|| TAU * 1e3 / rad_s),
-    }
-    .filter(|value| value.is_finite())
-}
-
-/// The standard error of a speed in this unit.
-#[must_use]
-pub fn sigma_in_unit(speed: &Speed, unit: Unit) -> Option<f32> {
-    match unit {
-        Unit::MsPerTurn => in_unit(speed.omega_rad_s, unit)
-            .map(|ms| ms * (speed.omega_sigma_rad_s / speed.omega_rad_s.abs())),
-        Unit::Rpm | Unit::Hertz | Unit::RadPerS => in_unit(speed.omega_sigma_rad_s, unit),
-    }
-}
-
 /// A number with a suffix in rpm; without a suffix it is in `unit`.
 pub fn to_rpm(value: f32, suffix: &[u8], unit: Unit) -> Result<f32, ErrorCode> {
     let (unit, scale) = if suffix.is_empty() {
@@ -81,14 +56,25 @@ pub fn to_rpm(value: f32, suffix: &[u8], unit: Unit) -> Result<f32, ErrorCode> {
     if rpm.is_finite() { Ok(rpm) } else { Err(ErrorCode::DataOutOfRange) }
 }
 
-/// Revolutions per minute in this unit.
+/// Revolutions per minute in this unit; `None` for the time of a turn at rest.
 #[must_use]
-pub fn from_rpm(rpm: f32, unit: Unit) -> Option<f32> {
+pub fn in_unit(rpm: f32, unit: Unit) -> Option<f32> {
     match unit {
         Unit::Rpm => Some(rpm),
         Unit::Hertz => Some(rpm / 60.0),
         Unit::RadPerS => Some(rpm / Speed::RPM_PER_RAD_S),
         Unit::MsPerTurn => (rpm > 0.0).then(|| 60e3 / rpm),
+    }
+}
+
+/// The standard error of a speed in this unit.
+#[must_use]
+pub fn sigma_in_unit(speed: &Speed, unit: Unit) -> Option<f32> {
+    match unit {
+        Unit::MsPerTurn => {
+            in_unit(speed.rpm(), unit).map(|ms| ms * (speed.rpm_sigma() / speed.rpm()))
+        }
+        Unit::Rpm | Unit::Hertz | Unit::RadPerS => in_unit(speed.rpm_sigma(), unit),
     }
 }
 
@@ -100,19 +86,16 @@ mod tests {
 
     #[test]
     fn one_speed_in_every_unit() {
-        let rad_s = 3000.0 / Speed::RPM_PER_RAD_S;
         for (unit, expected) in [
             (Unit::Rpm, 3000.0),
             (Unit::Hertz, 50.0),
             (Unit::RadPerS, 314.159_27),
             (Unit::MsPerTurn, 20.0),
         ] {
-            let found = in_unit(-rad_s, unit).expect("a speed");
+            let found = in_unit(3000.0, unit).expect("a speed");
             assert!((found / expected - 1.0).abs() < 1e-6, "{unit:?}: {found}");
             let rpm = to_rpm(expected, b"", unit).expect("a limit");
             assert!((rpm / 3000.0 - 1.0).abs() < 1e-6, "{unit:?}: {rpm}");
-            let back = from_rpm(rpm, unit).expect("a limit");
-            assert!((back / expected - 1.0).abs() < 1e-6, "{unit:?}: {back}");
         }
         assert_eq!(in_unit(0.0, Unit::MsPerTurn), None);
         assert_eq!(to_rpm(1.5, b"krpm", Unit::Hertz), Ok(1500.0));
@@ -129,7 +112,7 @@ mod tests {
             frame: Frame::Camera,
         };
         for unit in [Unit::Rpm, Unit::Hertz, Unit::RadPerS, Unit::MsPerTurn] {
-            let value = in_unit(speed.omega_rad_s, unit).expect("a speed");
+            let value = in_unit(speed.rpm(), unit).expect("a speed");
             let sigma = sigma_in_unit(&speed, unit).expect("a sigma");
             assert!((sigma / value - 0.005).abs() < 1e-7, "{unit:?}");
         }

@@ -90,7 +90,11 @@ impl<const BYTES: usize> MemoryFlash<BYTES> {
     }
 
     /// The range of a page or word, checked.
-    fn range(offset: u32, length: usize, unit: usize) -> Result<core::ops::Range<usize>, MemoryFlashError> {
+    fn range(
+        offset: u32,
+        length: usize,
+        unit: usize,
+    ) -> Result<core::ops::Range<usize>, MemoryFlashError> {
         let start = offset as usize;
         if !start.is_multiple_of(unit) || !length.is_multiple_of(unit) {
             return Err(MemoryFlashError::NotAligned);

@@ -78,7 +78,8 @@ fn power_cut_at_every_step_leaves_the_old_or_the_new() {
                 cuts += 1;
                 let found = load(&mut torn);
                 // The very first save has no old block to fall back to: a torn one is told.
-                let first = number == 0 && found == (Preferences::default(), Some(Fault::Preferences));
+                let first =
+                    number == 0 && found == (Preferences::default(), Some(Fault::Preferences));
                 let place = format!("number {number}, cut after {steps} steps and {share}/256");
                 assert!(found == old || found == new || first, "{place}: {found:?}");
                 assert_eq!(load(&mut torn), found, "{place}: loading again");
