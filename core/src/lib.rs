@@ -1,6 +1,7 @@
 //! The measurement: from events to rotor speed with an error bar.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
+extern crate std; // DBG
 
 pub mod decode;
 pub mod event;

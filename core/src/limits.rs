@@ -44,3 +44,6 @@ pub const MAX_CANDIDATES: usize = 20;
 
 /// Of these, those that are measured in one window at most: 12 x 36 B.
 pub const MAX_SUSPECTS: usize = 12;
+
+/// Knots of a rotor's path through the window: 64 x 12 B.
+pub const MAX_KNOTS: usize = 64;

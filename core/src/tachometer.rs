@@ -10,10 +10,9 @@ use heapless::Vec;
 use crate::event::{Event, Geometry, GyroSample};
 use crate::limits::{MAX_ROTORS, MAX_SUSPECTS};
 use crate::reading::{Evidence, Frame, Reading, Reason, RotorReading, Status};
-use crate::registration::Icp;
 use crate::rotors::extraction::{self, Extraction, View, weigh_heat};
 use crate::rotors::{Coherence, Disc, Found, HeatMap};
-use crate::speed::measurement::{Measurement, Outcome, Stated};
+use crate::speed::measurement::{Bench, Measurement, Outcome, Stated};
 use crate::speed::polar::PolarTrack;
 use crate::speed::scan::Scanner;
 use crate::store::{SPARE_SEGMENTS, Store, StoredEvent, WINDOW_SEGMENTS};
@@ -161,7 +160,7 @@ struct Suspect {
 #[expect(clippy::large_enum_variant, reason = "the larger one is the point: both share its memory")]
 enum Scratch {
     Search(extraction::Scratch),
-    Measure(Icp),
+    Measure(Bench),
 }
 
 /// Events in, readings out.
@@ -216,7 +215,7 @@ impl<'m> Tachometer<'m> {
             job: Job::Idle,
             polar: PolarTrack::new(),
             scanner: Scanner::default(),
-            scratch: Scratch::Measure(Icp::EMPTY),
+            scratch: Scratch::Measure(Bench::EMPTY),
             candidates: Vec::new(),
             outcomes: Vec::new(),
             in_step_hz: None,
@@ -438,12 +437,12 @@ impl<'m> Tachometer<'m> {
                 false
             }
             Job::Measure(index, measurement) => {
-                let Scratch::Measure(icp) = &mut self.scratch else { return true };
+                let Scratch::Measure(bench) = &mut self.scratch else { return true };
                 let stated = Stated {
                     blades: self.settings.blades,
                     clock_sigma_ppm: self.settings.clock_sigma_ppm,
                 };
-                if !measurement.step(&window, &stated, &mut self.polar, icp) {
+                if !measurement.step(&window, &stated, &mut self.polar, bench) {
                     return false;
                 }
                 let (index, outcome) = (*index, measurement.result());
@@ -495,7 +494,7 @@ impl<'m> Tachometer<'m> {
             return true;
         };
         if !matches!(self.scratch, Scratch::Measure(_)) {
-            self.scratch = Scratch::Measure(Icp::EMPTY);
+            self.scratch = Scratch::Measure(Bench::EMPTY);
         }
         let Suspect { found, followed } = self.candidates[next];
         let measurement = match followed {

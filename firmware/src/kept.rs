@@ -13,8 +13,8 @@ use crate::instrument::Fault;
 
 /// Bytes of a block.
 pub const KEPT_BYTES: usize = 128;
-/// Room for the message.
-const TEXT_BYTES: usize = KEPT_BYTES - 10;
+/// Room for the message of a fault.
+pub const TEXT_BYTES: usize = KEPT_BYTES - 10;
 const MAGIC: [u8; 4] = *b"EvF1";
 /// Without its table of 1 KB: it runs once a start.
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
@@ -30,9 +30,6 @@ pub struct KeptFault {
 }
 
 impl KeptFault {
-    /// Room for the message.
-    pub const TEXT_BYTES: usize = TEXT_BYTES;
-
     /// A fault and its message, anything that prints.
     #[must_use]
     pub fn new(fault: Fault, message: impl fmt::Display) -> Self {
@@ -148,7 +145,9 @@ mod tests {
                 block[KEPT_BYTES - 4..].copy_from_slice(&checksum.to_le_bytes());
             }
             // With a right checksum, whatever it says must still be checked.
-            take(&mut block);
+            if let Some(kept) = take(&mut block) {
+                prop_assert_eq!(take(&mut encode(&kept)), Some(kept));
+            }
         }
     }
 }

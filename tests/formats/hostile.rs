@@ -270,9 +270,38 @@ fn what_is_no_recording_is_refused_with_advice() {
     assert!(refusal("a.bag", b"#ROSBAG V2.0\n....").contains("rosbags-convert"));
     assert!(refusal("a.db3", b"SQLite format 3\0....").contains("DB3"));
     assert!(refusal("a.es", b"Event Stream\x01\x00\x00\x01").contains("ES"));
+    assert!(refusal("a.ev8", b"evtach8\n\x00\x00").contains("EV8, byte 8"));
+    assert!(refusal("a.ev8", &[b"evtach8\n".as_slice(), &[0; 16]].concat()).contains("byte 16"));
     assert!(refusal("a.npy", b"\x93NUMPY\x01\x00\xff\xff{").contains("NPY"));
     assert!(refusal("a.aedat4", b"#!AER-DAT4.0\r\n\xff\xff\xff\x7f").contains("byte 14"));
     assert!(refusal("a.gz", b"\x1f\x8b\x08\x00 not gzip").contains("compressed"));
+}
+
+#[test]
+fn the_devices_recording_is_read_as_far_as_its_header_counts() {
+    let events = some_events(100);
+    let mut bytes = bytes_of(WriteFormat::Ev8, &events);
+    bytes.extend_from_slice(b"what a terminal left behind");
+    let found = read_bytes("a.ev8", &bytes, None).expect("EV8");
+    assert_eq!(found.events, events);
+    assert!(found.recording.side().notes[0].contains(&format!("byte {}", 24 + 100 * 8)));
+    // A header that promises four thousand million events.
+    bytes[20..24].fill(0xff);
+    let found = read_bytes("a.ev8", &bytes, None).expect("EV8");
+    assert!(found.events.starts_with(&events) && found.events.len() < 104);
+    assert!(found.recording.side().notes[0].contains("before its header says so"));
+}
+
+#[test]
+fn what_the_devices_recording_cannot_hold_is_refused() {
+    let scratch = Scratch::new();
+    let far = event(1 << 31, 0, 0, true);
+    for wrong in [[event(0, 0, 0, true), far], [far, event(0, 0, 1 << 15, true)]] {
+        let mut writer =
+            write::create(&scratch.file("a.ev8"), WriteFormat::Ev8, SIZE).expect("a file");
+        let error = writer.write(&wrong).expect_err("does not fit").to_string();
+        assert!(error.contains("help: "), "{error}");
+    }
 }
 
 #[test]

@@ -89,6 +89,7 @@ fn time_that_steps_back_is_kept_where_the_format_can_hold_it() {
         WriteFormat::Csv,
         WriteFormat::Npy,
         WriteFormat::Spi,
+        WriteFormat::Ev8,
     ] {
         assert_eq!(through(format, &events).0, events, "{}", format.as_str());
     }

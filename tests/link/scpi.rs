@@ -404,7 +404,7 @@ fn the_longest_log_line_and_answer_fit() {
             let speed = Speed {
                 omega_rad_s: -12_345.678,
                 omega_sigma_rad_s: 1.234_567_8e-3,
-                alpha_rad_s2: Some(-9_876.543_2),
+                alpha_rad_s2: Some(-9_876.543),
                 frame: Frame::Camera,
             };
             RotorReading {

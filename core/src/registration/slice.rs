@@ -3,7 +3,7 @@
 use heapless::Vec;
 
 use crate::limits::SLICE_POINTS;
-use crate::speed::polar::Annulus;
+use crate::speed::path::Moving;
 use crate::store::{StoredEvent, Window};
 
 /// One event of a slice.
@@ -40,19 +40,19 @@ pub struct Cut {
 
 impl Cut {
     /// Collects the slice, evenly thinned to the capacity.
-    pub fn collect(&self, window: &Window<'_>, annulus: &Annulus, slice: &mut Slice) {
+    pub fn collect(&self, window: &Window<'_>, disc: &Moving<'_>, slice: &mut Slice) {
         slice.clear();
         let stretch = |fold: u32| {
             let start_us = self.start_us + fold as f32 * self.period_us;
             (start_us, window.between(start_us as i32, (start_us + self.length_us) as i32))
         };
-        let inside = |event: &StoredEvent| annulus.place(*event).is_some();
+        let inside = |event: &StoredEvent| disc.place(*event).is_some();
         let total: usize = (0..self.folds).map(|fold| stretch(fold).1.filter(inside).count()).sum();
         let (mut index, mut next) = (0, 0);
         for fold in 0..self.folds {
             let (start_us, events) = stretch(fold);
             for event in events {
-                let Some((x_px, y_px, _)) = annulus.place(event) else { continue };
+                let Some((x_px, y_px, _)) = disc.place(event) else { continue };
                 if index * SLICE_POINTS >= next {
                     let tau_s = (event.since(window.start_us) as f32 - start_us) * 1e-6;
                     slice.push(SlicePoint { x_px, y_px, tau_s, on: event.is_on() }).ok();

@@ -8,7 +8,7 @@
 use heapless::Vec;
 
 use super::initial::median;
-use super::polar::Annulus;
+use super::path::{Moving, Path};
 use super::statistics::{mean_and_error, student_over_normal};
 use crate::limits::MAX_PAIRS;
 use crate::math::TAU;
@@ -86,14 +86,14 @@ impl Pairs {
 
     /// Cuts the next pair, or advances its registration by one iteration; `true` once all are done.
     /// Cost: at most a million instructions.
-    pub fn step(&mut self, window: &Window<'_>, icp: &mut Icp) -> bool {
+    pub fn step(&mut self, window: &Window<'_>, path: &Path, icp: &mut Icp) -> bool {
         if self.next >= self.pairs {
             return true;
         }
         let angle_rad = self.pace.signed_angle_rad();
         let start_rad = (self.periods - libm::roundf(self.periods)) * angle_rad;
         if !self.registering {
-            self.cut(window, icp);
+            self.cut(window, path, icp);
             let residual = Residual::Helicoid { omega_rad_s: self.pace.omega_rad_s };
             icp.start(start_rad, self.pace.disc.radius_px, residual);
             self.registering = true;
@@ -109,21 +109,21 @@ impl Pairs {
     }
 
     /// Cuts the two slices of the next pair.
-    fn cut(&self, window: &Window<'_>, icp: &mut Icp) {
+    fn cut(&self, window: &Window<'_>, path: &Path, icp: &mut Icp) {
         let period_us = self.pace.period_us();
         let baseline_us = self.periods * period_us;
         let span_us = (self.folds as f32 - 1.0 + SLICE_PERIODS) * period_us;
         let room_us = (window.duration_us as f32 - baseline_us - span_us).max(0.0);
-        let annulus = Annulus::of(self.pace.disc);
+        let disc = Moving::new(self.pace.disc, path, window);
         let mut cut = Cut {
             start_us: room_us * self.next as f32 / (self.pairs.max(2) - 1) as f32,
             length_us: SLICE_PERIODS * period_us,
             period_us,
             folds: self.folds,
         };
-        cut.collect(window, &annulus, &mut icp.first);
+        cut.collect(window, &disc, &mut icp.first);
         cut.start_us += baseline_us;
-        cut.collect(window, &annulus, &mut icp.second);
+        cut.collect(window, &disc, &mut icp.second);
     }
 
     /// Starts the registrations from another speed, at the same baseline.

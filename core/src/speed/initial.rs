@@ -11,7 +11,7 @@
 
 use heapless::Vec;
 
-use super::polar::Annulus;
+use super::path::{Moving, Path};
 use crate::registration::{Icp, Progress, Registered, Residual, Slice, SlicePoint};
 use crate::rotors::Disc;
 use crate::store::{WINDOW_SEGMENTS, Window};
@@ -81,11 +81,15 @@ impl Ladder {
     }
 
     /// The rotor's events of the segment, placed.
-    fn placed<'a>(&self, window: &Window<'a>) -> impl Iterator<Item = (i32, SlicePoint)> + use<'a> {
-        let annulus = Annulus::of(self.disc);
+    fn placed<'a>(
+        &self,
+        window: &Window<'a>,
+        path: &'a Path,
+    ) -> impl Iterator<Item = (i32, SlicePoint)> + use<'a> {
+        let disc = Moving::new(self.disc, path, window);
         let start_us = window.start_us;
         window.segment(self.segment).iter().filter_map(move |event| {
-            let (x_px, y_px, _) = annulus.place(*event)?;
+            let (x_px, y_px, _) = disc.place(*event)?;
             let point = SlicePoint { x_px, y_px, tau_s: 0.0, on: event.is_on() };
             Some((event.since(start_us), point))
         })
@@ -93,7 +97,7 @@ impl Ladder {
 
     /// Cuts the slices of the next level, or advances their registration by one iteration; `true` at the top.
     /// Cost: at most half a million instructions.
-    pub fn step(&mut self, window: &Window<'_>, icp: &mut Icp) -> bool {
+    pub fn step(&mut self, window: &Window<'_>, path: &Path, icp: &mut Icp) -> bool {
         if self.baseline_s > 0.0 {
             return match icp.step() {
                 Progress::Running => false,
@@ -101,22 +105,22 @@ impl Ladder {
             };
         }
         if self.level == 0 {
-            self.size = (self.placed(window).count() / SLICES).min(MOST_EVENTS);
+            self.size = (self.placed(window, path).count() / SLICES).min(MOST_EVENTS);
             if self.size < LEAST_EVENTS {
                 return true;
             }
-            let mut events = self.placed(window);
+            let mut events = self.placed(window, path);
             (self.first_us, _) = take(&mut events, self.size, self.size, &mut icp.first);
             self.passed = self.size;
         }
         self.level += 1;
-        self.level > MOST_LEVELS || !self.cut(window, icp)
+        self.level > MOST_LEVELS || !self.cut(window, path, icp)
     }
 
     /// Cuts the later slice of the next level and starts its registration; `false` when the ladder ends.
-    fn cut(&mut self, window: &Window<'_>, icp: &mut Icp) -> bool {
+    fn cut(&mut self, window: &Window<'_>, path: &Path, icp: &mut Icp) -> bool {
         let length = self.size.max((GROWTH * self.passed as f32) as usize);
-        let mut events = self.placed(window).skip(self.passed);
+        let mut events = self.placed(window, path).skip(self.passed);
         let (second_us, length_us) = take(&mut events, length, self.size, &mut icp.second);
         self.passed += length;
         let baseline_s = (second_us - self.first_us) * 1e-6;

@@ -4,8 +4,9 @@ mod verdict;
 
 use super::baseline::{Estimate, Pace, Pairs};
 use super::initial::{Ladder, Rates, median};
-use super::phase::{Pattern, harmonics, newton, slope};
-use super::polar::{PolarTrack, track};
+use super::phase::{Pattern, harmonics, newton};
+use super::polar::{PolarEvent, PolarTrack, track};
+use super::pose::{Pose, Sums};
 use super::statistics::mean_and_error;
 use super::symmetry::symmetry;
 use crate::math::TAU;
@@ -16,9 +17,7 @@ use crate::store::{WINDOW_SEGMENTS, Window};
 
 /// Steps of centre and speed by the polar phase.
 const NEWTON_STEPS: u8 = 6;
-/// The same for a rotor that is followed from window to window.
-const FOLLOWING_STEPS: u8 = 2;
-/// Relative error of the speed of a rotor that is followed, after these steps.
+/// Relative error of the speed of a rotor that is followed from window to window.
 const FOLLOWING_SIGMA: f32 = 1e-3;
 /// A rotor keeps at least this share of its events in step.
 const LEAST_COHERENCE: f32 = 0.3;
@@ -29,12 +28,6 @@ const MOST_STANDING: f32 = 0.8;
 /// slices falls short of the turn by up to a tenth.
 const COARSE_AGREEMENT: f32 = 0.15;
 const MOST_COARSE_AGREEMENT: f32 = 0.25;
-/// Multiples of the blade count that are looked at for the phase, the highest harmonic, the least share in step,
-/// and the steps of the centre.
-const MOST_MULTIPLE: u32 = 4;
-const MOST_HARMONIC: u32 = 16;
-const SHARP_COHERENCE: f32 = 0.4;
-const SHARPEN_STEPS: u8 = 3;
 /// The rate about a free axis contradicts when it is off by this share and this many of its standard errors.
 const FREE_AXIS_AGREEMENT: f32 = 0.25;
 const FREE_AXIS_SIGMAS: f32 = 4.0;
@@ -82,14 +75,26 @@ enum Stage {
     Newton,
     Scan,
     Symmetry,
-    Sharpen,
+    Pose,
     Initial,
     Refinement,
     Further,
     Lock,
     Fractional,
-    Phase,
+    Verdict,
     Done,
+}
+
+/// Memory that the stages work in.
+#[derive(Debug)]
+pub struct Bench {
+    icp: Icp,
+    sums: Sums,
+}
+
+impl Bench {
+    /// Nothing on it. A constant, so that it is copied into place instead of being built on the stack.
+    pub const EMPTY: Self = Self { icp: Icp::EMPTY, sums: Sums::EMPTY };
 }
 
 /// The measurement of one rotor.
@@ -106,6 +111,7 @@ pub struct Measurement {
     omega_rad_s: f32,
     /// Angular harmonic whose phase is followed.
     harmonic: u32,
+    pose: Pose,
     /// Frequency and angular harmonic of the line that the rotor was found by.
     line_hz: f32,
     windings: u32,
@@ -140,6 +146,7 @@ impl Measurement {
             disc: found.disc,
             omega_rad_s: found.omega_rad_s,
             harmonic: found.windings,
+            pose: Pose::new(found.disc, found.omega_rad_s, 1, found.windings, 0),
             line_hz: found.line_hz,
             windings: found.windings,
             events: 0,
@@ -166,7 +173,7 @@ impl Measurement {
     pub fn follow(found: &Found, parts: Option<u8>, alike: bool) -> Self {
         let mut following = Self::new(found);
         following.follows = true;
-        following.turn = following.first_turn();
+        following.stage = Stage::Pose;
         following.parts = parts;
         following.alike = alike;
         following
@@ -178,19 +185,23 @@ impl Measurement {
         window: &Window<'_>,
         stated: &Stated,
         polar: &mut PolarTrack,
-        icp: &mut Icp,
+        bench: &mut Bench,
     ) -> bool {
+        let Bench { icp, sums } = bench;
         match self.stage {
             Stage::Newton => self.newton(window, polar),
             Stage::Scan => self.scan(polar),
             Stage::Symmetry => self.symmetry(stated, polar),
-            Stage::Sharpen => self.sharpen(window, polar),
+            Stage::Pose => self.pose(window, sums),
             Stage::Initial => self.initial(window, icp),
             Stage::Refinement => self.refinement(window, icp),
             Stage::Further => self.further(window, icp),
             Stage::Lock => self.lock(window, icp),
             Stage::Fractional => self.fractional(window, icp),
-            Stage::Phase => self.phase(window, stated, polar),
+            Stage::Verdict => {
+                self.verdict(window, stated);
+                self.stage = Stage::Done;
+            }
             Stage::Done => {}
         }
         self.stage == Stage::Done
@@ -203,13 +214,13 @@ impl Measurement {
             Stage::Newton => "centre",
             Stage::Scan => "scan",
             Stage::Symmetry => "symmetry",
-            Stage::Sharpen => "sharpen",
+            Stage::Pose => "pose",
             Stage::Initial => "initial",
             Stage::Refinement => "refinement",
             Stage::Further => "further refinement",
             Stage::Lock => "lock",
             Stage::Fractional => "fractional test",
-            Stage::Phase => "phase",
+            Stage::Verdict => "verdict",
             Stage::Done => "done",
         }
     }
@@ -221,7 +232,7 @@ impl Measurement {
 
     /// Centre and speed by the polar phase, a Newton step at a time.
     fn newton(&mut self, window: &Window<'_>, polar: &mut PolarTrack) {
-        if self.turn == self.first_turn() {
+        if self.turn == 0 {
             self.events = track(window, self.disc, polar);
         }
         self.evidence.events = self.events as u32;
@@ -241,18 +252,7 @@ impl Measurement {
         if coherence < LEAST_COHERENCE {
             return self.refuse(Reason::NoRotation);
         }
-        if self.follows {
-            self.count_periods(window);
-            self.plan_lock(window, self.omega_rad_s.abs() * FOLLOWING_SIGMA);
-            self.stage = Stage::Lock;
-            return;
-        }
         self.stage = Stage::Scan;
-    }
-
-    /// Turn at which the centre starts to be refined.
-    const fn first_turn(&self) -> u8 {
-        if self.follows { NEWTON_STEPS - FOLLOWING_STEPS } else { 0 }
     }
 
     /// Symmetry periods in the window, and the window that a lock needs.
@@ -266,7 +266,7 @@ impl Measurement {
     }
 
     /// Which harmonic of the line turns about the refined centre: first coarse witness.
-    fn scan(&mut self, polar: &PolarTrack) {
+    fn scan(&mut self, polar: &[PolarEvent]) {
         let line_hz = self.omega_rad_s.abs() * self.harmonic as f32 / TAU;
         let scan = harmonics(polar, self.disc, line_hz);
         let standing = scan.second_share / scan.share.max(1e-3);
@@ -297,7 +297,7 @@ impl Measurement {
     }
 
     /// Angle of symmetry.
-    fn symmetry(&mut self, stated: &Stated, polar: &PolarTrack) {
+    fn symmetry(&mut self, stated: &Stated, polar: &[PolarEvent]) {
         let symmetry = symmetry(polar, self.disc, self.omega_rad_s);
         self.parts = stated.blades.or(symmetry.parts);
         self.alike = stated.blades.is_none() && symmetry.score >= ALIKE_SCORE;
@@ -308,30 +308,45 @@ impl Measurement {
             return self.refuse(Reason::TooFast);
         }
         self.turn = 0;
-        self.stage = Stage::Sharpen;
+        self.stage = Stage::Pose;
     }
 
-    /// Goes over to the multiple of the blade count that tells most about the phase, and refines the centre with it.
-    fn sharpen(&mut self, window: &Window<'_>, polar: &mut PolarTrack) {
-        let parts = u32::from(self.parts.unwrap_or(1)).max(1);
+    /// Follows the rotor's pose through the window, a round at a time: second witness of the lock.
+    fn pose(&mut self, window: &Window<'_>, sums: &mut Sums) {
         if self.turn == 0 {
-            let mut best = (0.0_f32, self.harmonic);
-            for harmonic in (1..=MOST_MULTIPLE).map(|k| k * parts).filter(|h| *h <= MOST_HARMONIC) {
-                let coherence =
-                    Pattern::learn(polar, self.disc, self.omega_rad_s, harmonic).coherence();
-                let lever = coherence * harmonic as f32;
-                if coherence > SHARP_COHERENCE && lever > best.0 {
-                    best = (lever, harmonic);
-                }
+            self.turn = 1;
+            let parts = if self.alike { u32::from(self.parts.unwrap_or(1)).max(1) } else { 1 };
+            self.pose =
+                Pose::new(self.disc, self.omega_rad_s, parts, self.harmonic, window.duration_us);
+        }
+        if !self.pose.step(window, sums) {
+            return;
+        }
+        self.turn = 0;
+        self.events = self.pose.events();
+        self.evidence.events = self.events as u32;
+        if self.events < LEAST_EVENTS {
+            return self.refuse(Reason::TooFewEvents);
+        }
+        if let Some(found) = self.pose.slope() {
+            self.evidence.phase_rad_s = Some(found.speed.omega_rad_s);
+            self.evidence.phase_sigma_rad_s = Some(found.speed.sigma_rad_s);
+            self.drift_px_s = found.drift_px_s;
+            if found.alpha_rad_s2.abs() > 4.0 * found.alpha_sigma_rad_s2 {
+                self.alpha_rad_s2 = Some(found.alpha_rad_s2);
             }
-            self.harmonic = best.1;
         }
-        self.step_centre(window, polar);
-        self.turn += 1;
-        if self.turn >= SHARPEN_STEPS {
-            self.turn = 0;
+        if !self.follows {
             self.stage = Stage::Initial;
+            return;
         }
+        self.evidence.coherence = Some(self.pose.coherence());
+        if self.pose.coherence() < LEAST_COHERENCE {
+            return self.refuse(Reason::NoRotation);
+        }
+        self.count_periods(window);
+        self.plan_lock(window, self.omega_rad_s.abs() * FOLLOWING_SIGMA);
+        self.stage = Stage::Lock;
     }
 
     /// One Newton step of centre and speed; `false` when the phase gives none.
@@ -350,7 +365,7 @@ impl Measurement {
     /// Initial alignment in every other segment: second coarse witness.
     fn initial(&mut self, window: &Window<'_>, icp: &mut Icp) {
         if let Some(ladder) = &mut self.ladder {
-            if ladder.step(window, icp) {
+            if ladder.step(window, self.pose.path(), icp) {
                 let rates = if self.free_axis { &mut self.free_rates } else { &mut self.rates };
                 rates.extend(ladder.rate_rad_s());
                 self.ladder = None;
@@ -398,7 +413,7 @@ impl Measurement {
         self.estimate = Estimate { omega_rad_s: self.omega_rad_s, sigma_rad_s: spread };
         self.status = Status::Coarse;
         if periods < 1.0 + REFINEMENT_PERIODS {
-            self.stage = Stage::Phase;
+            self.stage = Stage::Verdict;
             return;
         }
         self.plan(window, REFINEMENT_PERIODS, REFINEMENT_PAIRS);
@@ -421,14 +436,14 @@ impl Measurement {
     /// Advances the planned pairs; the finished set once all are registered.
     fn advance(&mut self, window: &Window<'_>, icp: &mut Icp) -> Option<Pairs> {
         let pairs = self.pairs.as_mut()?;
-        if pairs.step(window, icp) { self.pairs.take() } else { None }
+        if pairs.step(window, self.pose.path(), icp) { self.pairs.take() } else { None }
     }
 
     /// The paper's refinement: step extended to 0.8 of half an angle of symmetry.
     fn refinement(&mut self, window: &Window<'_>, icp: &mut Icp) {
         let Some(pairs) = self.advance(window, icp) else { return };
         let Some(refined) = pairs.median() else {
-            self.stage = Stage::Phase;
+            self.stage = Stage::Verdict;
             return;
         };
         self.evidence.refined_rad_s = Some(refined.omega_rad_s);
@@ -489,23 +504,7 @@ impl Measurement {
     fn fractional(&mut self, window: &Window<'_>, icp: &mut Icp) {
         let Some(pairs) = self.advance(window, icp) else { return };
         self.evidence.fractional_deviation = pairs.deviation();
-        self.stage = Stage::Phase;
-    }
-
-    /// Polar phase: second witness of the lock; then the verdict.
-    fn phase(&mut self, window: &Window<'_>, stated: &Stated, polar: &mut PolarTrack) {
-        track(window, self.disc, polar);
-        let found = slope(polar, self.disc, self.omega_rad_s, self.harmonic, window.duration_us);
-        if let Some(found) = found {
-            self.evidence.phase_rad_s = Some(found.speed.omega_rad_s);
-            self.evidence.phase_sigma_rad_s = Some(found.speed.sigma_rad_s);
-            self.drift_px_s = found.drift_px_s;
-            if found.alpha_rad_s2.abs() > 4.0 * found.alpha_sigma_rad_s2 {
-                self.alpha_rad_s2 = Some(found.alpha_rad_s2);
-            }
-        }
-        self.verdict(window, stated);
-        self.stage = Stage::Done;
+        self.stage = Stage::Verdict;
     }
 
     /// The result, once [`Self::step`] has returned `true`.
@@ -517,10 +516,12 @@ impl Measurement {
             alpha_rad_s2: self.alpha_rad_s2,
             frame: Frame::Camera,
         });
+        let knot = self.pose.path().at(0.0);
+        let (x_px, y_px) = (self.disc.x_px + knot.x_px, self.disc.y_px + knot.y_px);
         Outcome {
             status: self.status,
             found: Found {
-                disc: self.disc,
+                disc: Disc { x_px, y_px, ..self.disc },
                 omega_rad_s: self.omega_rad_s,
                 windings: self.harmonic,
                 line_hz: self.line_hz,

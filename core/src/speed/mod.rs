@@ -3,8 +3,11 @@
 pub mod baseline;
 pub mod initial;
 pub mod measurement;
+pub mod path;
 pub mod phase;
 pub mod polar;
+pub mod pose;
 pub mod scan;
 pub mod statistics;
 pub mod symmetry;
+pub mod trend;

@@ -6,22 +6,11 @@
 //! The deviation psi from it is explained to first order by a wrong centre, speed and phase; a Newton step on the
 //! sum of cos(psi) finds them. Cost: about 150 instructions an event and step.
 
-use heapless::Vec;
-use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
+use nalgebra::{Matrix4, Vector4};
 
-use super::baseline::Estimate;
 use super::polar::PolarEvent;
-use super::statistics::{Parabola, fit_parabola, student_over_normal};
 use crate::math::{TAU, Turn, TurnRate};
 use crate::rotors::Disc;
-
-/// Blocks that the window is cut into for the slope.
-const BLOCKS: usize = 12;
-/// Fewest events in a block that counts.
-const LEAST_IN_BLOCK: u32 = 24;
-/// How far the centre is thought to move within the window, in pixels: keeps the shift of a block finite where its
-/// events lie to one side of the centre.
-const SHIFT_PRIOR_PX: f32 = 2.0;
 
 /// Rings between centre and rim.
 pub const RINGS: usize = 8;
@@ -184,97 +173,5 @@ pub fn newton(
         dx_px: solved[0] * disc.radius_px,
         dy_px: solved[1] * disc.radius_px,
         domega_rad_s: solved[2] * per_us * 1e6,
-    })
-}
-
-/// The polar phase followed through the window.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Slope {
-    /// Speed at the middle of the window.
-    pub speed: Estimate,
-    /// Acceleration in rad/s^2.
-    pub alpha_rad_s2: f32,
-    /// Its standard error in rad/s^2.
-    pub alpha_sigma_rad_s2: f32,
-    /// Root mean square speed of the centre in px/s: 0 on a tripod, tens in the hand.
-    pub drift_px_s: f32,
-}
-
-#[derive(Clone, Copy, Debug, Default)]
-struct Block {
-    normal: Matrix3<f32>,
-    right: Vector3<f32>,
-    in_step: f32,
-    time_us: f32,
-    count: u32,
-}
-
-/// Phase by blocks of the window, each with a shift of the centre of its own, and a parabola through them.
-///
-/// Second witness of the lock: no slices, no matching, all events of the track.
-#[must_use]
-pub fn slope(
-    track: &[PolarEvent],
-    disc: Disc,
-    omega_rad_s: f32,
-    harmonic: u32,
-    window_us: u32,
-) -> Option<Slope> {
-    let pattern = Pattern::learn(track, disc, omega_rad_s, harmonic);
-    let turns = pattern.turns();
-    let rate = TurnRate::from_rad_s(omega_rad_s);
-    let m = harmonic as f32;
-    let half_us = (window_us / 2) as i32;
-    let mut blocks = [Block::default(); BLOCKS];
-    for event in track {
-        let place =
-            (event.t_us + half_us).max(0) as u64 * BLOCKS as u64 / u64::from(window_us.max(1));
-        let block = &mut blocks[(place as usize).min(BLOCKS - 1)];
-        let psi = phase(*event, rate, harmonic).minus(turns[bank(*event, disc)]);
-        let (sin_psi, cos_psi) = psi.sin_cos();
-        let (sin, cos) = event.angle().sin_cos();
-        let lever = m / event.radius_px().max(1.0);
-        let a = Vector3::new(m, -sin * lever, cos * lever);
-        block.normal.ger(1.0, &a, &a, 1.0);
-        block.right += a * sin_psi;
-        block.in_step += cos_psi;
-        block.time_us += event.t_us as f32;
-        block.count += 1;
-    }
-    let mut points = Vec::<(f32, f32, f32), BLOCKS>::new();
-    let mut shifts = Vec::<(f32, f32, f32), BLOCKS>::new();
-    for block in &blocks {
-        let share = block.in_step / (block.count as f32).max(1.0);
-        if block.count < LEAST_IN_BLOCK || share <= 0.05 {
-            continue;
-        }
-        // A prior worth a tenth of the block's own weight at the rim.
-        let prior = 0.1 * block.count as f32 * share * m * m / (disc.radius_px * disc.radius_px)
-            * (1.0 / SHIFT_PRIOR_PX);
-        let damped =
-            block.normal * share + Matrix3::from_diagonal(&Vector3::new(0.0, prior, prior));
-        let solved = damped.cholesky()?.solve(&block.right);
-        let time_s = block.time_us / block.count as f32 * 1e-6;
-        points.push((time_s, solved[0], block.in_step)).ok();
-        shifts.push((time_s, solved[1], solved[2])).ok();
-    }
-    let parabola: Parabola = fit_parabola(&points)?;
-    let factor = student_over_normal(points.len().saturating_sub(3));
-    let mut drift2 = 0.0;
-    for pair in shifts.windows(2) {
-        if let [before, after] = pair {
-            let dt = (after.0 - before.0).max(1e-6);
-            let (vx, vy) = ((after.1 - before.1) / dt, (after.2 - before.2) / dt);
-            drift2 += (vx * vx + vy * vy) / (shifts.len() - 1) as f32;
-        }
-    }
-    Some(Slope {
-        speed: Estimate {
-            omega_rad_s: omega_rad_s + parabola.slope,
-            sigma_rad_s: factor * parabola.slope_error,
-        },
-        alpha_rad_s2: 2.0 * parabola.curve,
-        alpha_sigma_rad_s2: 2.0 * factor * parabola.curve_error,
-        drift_px_s: crate::math::sqrt(drift2),
     })
 }

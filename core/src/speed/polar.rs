@@ -34,7 +34,14 @@ impl Annulus {
     /// Position relative to the centre, and its squared length, when the event lies in the annulus.
     #[must_use]
     pub fn place(&self, event: StoredEvent) -> Option<(f32, f32, f32)> {
-        let (dx, dy) = (f32::from(event.x()) - self.x_px, f32::from(event.y()) - self.y_px);
+        self.place_from(event, (0.0, 0.0))
+    }
+
+    /// The same with the annulus shifted by (x, y) pixels.
+    #[must_use]
+    pub fn place_from(&self, event: StoredEvent, shift_px: (f32, f32)) -> Option<(f32, f32, f32)> {
+        let dx = f32::from(event.x()) - self.x_px - shift_px.0;
+        let dy = f32::from(event.y()) - self.y_px - shift_px.1;
         let r2 = dx * dx + dy * dy;
         (r2 >= self.inner2 && r2 <= self.outer2).then_some((dx, dy, r2))
     }

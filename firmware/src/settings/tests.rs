@@ -22,7 +22,7 @@ fn numbered(number: u32) -> Preferences {
     Preferences {
         unit: [Unit::Hertz, Unit::RadPerS, Unit::MsPerTurn][number as usize % 3],
         alarm: Alarm {
-            low_rpm: (number % 2 == 0).then_some(100.0 + number as f32),
+            low_rpm: number.is_multiple_of(2).then_some(100.0 + number as f32),
             high_rpm: Some(5_000.0 + number as f32),
         },
         blades: Some(1 + (number % 31) as u8),

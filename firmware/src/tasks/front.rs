@@ -8,7 +8,7 @@ use heapless::String;
 
 use super::shared::{Shared, Wanted};
 use crate::instrument::{Action, Fault, Instrument, Mode, Preferences, Sensor, Traffic};
-use crate::kept::KeptFault;
+use crate::kept::{KeptFault, TEXT_BYTES};
 use crate::scpi::{RecorderFailed, RecorderStatus, View};
 
 /// What the recorder's memory belongs to: the board says how it is shared with the task that fills it.
@@ -49,7 +49,7 @@ pub struct Front<R, P> {
     pub(super) first_us: Option<u64>,
     pub(super) view: View,
     /// The words of a fault that has not been acknowledged.
-    words: Option<String<{ KeptFault::TEXT_BYTES }>>,
+    words: Option<String<TEXT_BYTES>>,
     /// What the measurement was last told to look at.
     told: Wanted,
     /// Sensor time reached, and when it was.

@@ -8,6 +8,7 @@ mod csv;
 mod dat;
 mod error;
 mod es;
+mod ev8;
 mod geometry;
 mod imu;
 mod input;

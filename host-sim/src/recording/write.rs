@@ -11,6 +11,7 @@ use super::csv::CsvWriter;
 use super::dat::DatWriter;
 use super::error::RecordingError;
 use super::es::EsWriter;
+use super::ev8::Ev8Writer;
 use super::npy::NpyWriter;
 use super::raw::{Evt2Writer, Evt3Writer};
 use super::spi::SpiWriter;
@@ -34,11 +35,13 @@ pub enum WriteFormat {
     Es,
     /// What the device reads over SPI.
     Spi,
+    /// The device's own.
+    Ev8,
 }
 
 impl WriteFormat {
     /// Every format, in the order of the documentation.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Evt2,
         Self::Evt3,
         Self::Dat,
@@ -47,6 +50,7 @@ impl WriteFormat {
         Self::Npy,
         Self::Es,
         Self::Spi,
+        Self::Ev8,
     ];
 
     /// The name used on the command line.
@@ -61,6 +65,7 @@ impl WriteFormat {
             Self::Npy => "npy",
             Self::Es => "es",
             Self::Spi => "spi",
+            Self::Ev8 => "ev8",
         }
     }
 
@@ -72,7 +77,9 @@ impl WriteFormat {
             Self::Evt3 => ((1 << 38) - 1, true),
             Self::Dat => ((1 << 32) - 1, false),
             Self::Es => (3_600_000_000, true),
-            Self::Aedat4 | Self::Csv | Self::Npy | Self::Spi => (i64::MAX as u64, false),
+            Self::Aedat4 | Self::Csv | Self::Npy | Self::Spi | Self::Ev8 => {
+                (i64::MAX as u64, false)
+            }
         }
     }
 
@@ -90,6 +97,7 @@ impl WriteFormat {
             ("npy", _) => Some(Self::Npy),
             ("es", _) => Some(Self::Es),
             ("spi", _) => Some(Self::Spi),
+            ("ev8", _) => Some(Self::Ev8),
             _ => None,
         }
     }
@@ -154,6 +162,7 @@ pub fn create(
         WriteFormat::Npy => Box::new(NpyWriter::new(target)?),
         WriteFormat::Es => Box::new(EsWriter::new(target, geometry)?),
         WriteFormat::Spi => Box::new(SpiWriter::new(target, geometry)),
+        WriteFormat::Ev8 => Box::new(Ev8Writer::new(target, geometry)?),
     };
     Ok(Writer { sink })
 }

@@ -1,0 +1,120 @@
+//! The way of a rotor's axis through the window, and its turn beyond an even one.
+
+use heapless::Vec;
+
+use super::polar::Annulus;
+use crate::limits::MAX_KNOTS;
+use crate::rotors::Disc;
+use crate::store::{StoredEvent, Window};
+
+/// What the rotor did beside turning evenly, at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Knot {
+    /// Place of the axis from the disc's centre, in pixels.
+    pub x_px: f32,
+    /// Place of the axis from the disc's centre, in pixels.
+    pub y_px: f32,
+    /// Turn beyond an even one in radians, positive = clockwise.
+    pub turn_rad: f32,
+}
+
+/// Knots at equal times from the start of the window on, with straight lines between. The stretches between are
+/// called blocks.
+#[derive(Clone, Debug)]
+pub struct Path {
+    knots: Vec<Knot, MAX_KNOTS>,
+    /// Time of the first knot since the middle of the window.
+    start_us: f32,
+    step_us: f32,
+}
+
+impl Path {
+    /// An axis at rest and an even turn.
+    pub const STILL: Self = Self { knots: Vec::new(), start_us: 0.0, step_us: 1.0 };
+
+    /// The same way through knots `step_us` apart from `start_us` on: `blocks` of them and one more.
+    #[must_use]
+    pub fn divided(&self, start_us: f32, step_us: f32, blocks: usize) -> Self {
+        let mut path = Self { knots: Vec::new(), start_us, step_us };
+        for k in 0..=blocks.clamp(1, MAX_KNOTS - 1) {
+            path.knots.push(self.at(start_us + k as f32 * step_us)).ok();
+        }
+        path
+    }
+
+    /// Number of blocks.
+    #[must_use]
+    pub fn blocks(&self) -> usize {
+        self.knots.len().saturating_sub(1)
+    }
+
+    /// Length of a block in microseconds.
+    #[must_use]
+    pub const fn step_us(&self) -> f32 {
+        self.step_us
+    }
+
+    /// The knots.
+    #[must_use]
+    pub fn knots(&self) -> &[Knot] {
+        &self.knots
+    }
+
+    /// The knots, to be moved.
+    pub fn knots_mut(&mut self) -> &mut [Knot] {
+        &mut self.knots
+    }
+
+    /// The block that an instant lies in, and how far through it: 0 to 1, beyond it outside the path.
+    #[must_use]
+    pub fn place(&self, t_us: f32) -> (usize, f32) {
+        let place = (t_us - self.start_us) / self.step_us;
+        let index = (place.max(0.0) as usize).min(self.blocks().saturating_sub(1));
+        (index, place - index as f32)
+    }
+
+    /// Where the rotor was `t_us` after the middle of the window.
+    #[must_use]
+    pub fn at(&self, t_us: f32) -> Knot {
+        let (index, f) = self.place(t_us);
+        let (Some(a), Some(b)) = (self.knots.get(index), self.knots.get(index + 1)) else {
+            return Knot::default();
+        };
+        Knot {
+            x_px: a.x_px + f * (b.x_px - a.x_px),
+            y_px: a.y_px + f * (b.y_px - a.y_px),
+            turn_rad: a.turn_rad + f * (b.turn_rad - a.turn_rad),
+        }
+    }
+}
+
+/// A rotor's disc that goes along a path.
+#[derive(Clone, Copy, Debug)]
+pub struct Moving<'p> {
+    annulus: Annulus,
+    path: &'p Path,
+    start_us: u64,
+    middle_us: i32,
+}
+
+impl<'p> Moving<'p> {
+    /// The disc in this window.
+    #[must_use]
+    pub fn new(disc: Disc, path: &'p Path, window: &Window<'_>) -> Self {
+        let middle_us = (window.duration_us / 2) as i32;
+        Self { annulus: Annulus::of(disc), path, start_us: window.start_us, middle_us }
+    }
+
+    /// Position relative to the axis, and its squared length, when the event lies in the disc's annulus.
+    #[must_use]
+    pub fn place(&self, event: StoredEvent) -> Option<(f32, f32, f32)> {
+        let knot = self.path.at(self.since_middle_us(event) as f32);
+        self.annulus.place_from(event, (knot.x_px, knot.y_px))
+    }
+
+    /// Time since the middle of the window in microseconds.
+    #[must_use]
+    pub const fn since_middle_us(&self, event: StoredEvent) -> i32 {
+        event.since(self.start_us) - self.middle_us
+    }
+}

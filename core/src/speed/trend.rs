@@ -1,0 +1,210 @@
+//! The trend of the turn through the window: how far the rotor turned from its first instant to its last.
+//!
+//! The mean speed over a window is the turn between its ends, and the slope of a straight line only while the speed
+//! holds still: the hand that rolls the camera and the motor that hunts bend the line. So polynomials are added for
+//! as long as they explain more than noise does; each is made orthogonal to those before, hence its
+//! coefficient and its error stand by themselves, and no system of equations is solved.
+
+use crate::math::{ln, sqrt};
+
+/// Most points of a trend.
+pub const MOST_POINTS: usize = crate::limits::MAX_KNOTS;
+/// Highest degree.
+const MOST_DEGREE: usize = 16;
+/// A further degree must lower the logarithm of the likelihood by this half: between the criteria of Akaike (2) and, for the
+/// number of points here, Schwarz (4).
+const DEGREE_COST: f32 = 8.0;
+/// What is left of a polynomial beside those before, below which it says nothing new.
+const LEAST_REST: f32 = 1e-3;
+
+/// A point of the trend.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Point {
+    /// Time since the middle of the window, in units of half its length: -1 to 1.
+    pub u: f32,
+    /// What is to be explained.
+    pub y: f32,
+    /// Weight; 0 for a point that does not count.
+    pub weight: f32,
+}
+
+/// A trend through points, in units of half a window.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Trend {
+    /// Change of y over the window, over two: the mean slope.
+    pub slope: f32,
+    /// Its standard error from the scatter about the trend.
+    pub slope_error: f32,
+    /// Second derivative of the parabola.
+    pub bend: f32,
+    /// Its standard error.
+    pub bend_error: f32,
+    /// Degree that was needed.
+    pub degree: usize,
+    /// Points beyond those that the fit takes up.
+    pub degrees_of_freedom: usize,
+}
+
+/// A polynomial made orthogonal: its values at the points.
+type Values = [f32; MOST_POINTS];
+
+/// Points with weights, some of which share an offset.
+struct Points<'p> {
+    points: &'p [Point],
+    fold: usize,
+}
+
+impl Points<'_> {
+    /// Takes from every value the mean over the points that share its offset; how many offsets there are.
+    fn take_offsets(&self, values: &mut Values) -> usize {
+        let mut offsets = 0;
+        for first in 0..self.fold {
+            let places = || (first..self.points.len()).step_by(self.fold);
+            let weight: f32 = places().map(|i| self.points[i].weight).sum();
+            if weight <= 0.0 {
+                continue;
+            }
+            offsets += 1;
+            let mean = places().map(|i| self.points[i].weight * values[i]).sum::<f32>() / weight;
+            places().for_each(|i| values[i] -= mean);
+        }
+        offsets
+    }
+
+    fn product(&self, a: &Values, b: &Values) -> f32 {
+        self.points.iter().zip(a.iter().zip(b)).map(|(p, (a, b))| p.weight * a * b).sum()
+    }
+}
+
+impl Trend {
+    /// Fits a trend, with an offset of its own for every `fold`-th point: points i and i + fold share one. `None` when
+    /// too few points are left. At most [`MOST_POINTS`] count. Cost: about 20 instructions a point and degree squared.
+    #[must_use]
+    pub fn fit(points: &[Point], fold: usize) -> Option<Self> {
+        let points = &points[..points.len().min(MOST_POINTS)];
+        let points = Points { points, fold: fold.max(1) };
+        let used = points.points.iter().filter(|p| p.weight > 0.0).count();
+        let mut rest: Values = [0.0; MOST_POINTS];
+        for (value, point) in rest.iter_mut().zip(points.points) {
+            *value = point.y;
+        }
+        let free = used.checked_sub(points.take_offsets(&mut rest))?;
+        let mut basis = [[0.0_f32; MOST_POINTS]; MOST_DEGREE];
+        // Mean slope over the window of each polynomial, and its coefficient.
+        let (mut slopes, mut coefficients) = ([0.0_f32; MOST_DEGREE], [0.0_f32; MOST_DEGREE]);
+        let mut bend = 0.0;
+        let mut best: Option<(f32, Self)> = None;
+        for degree in 1..=MOST_DEGREE.min(free / 3) {
+            let index = degree - 1;
+            let (before, after) = basis.split_at_mut(index);
+            let values = &mut after[0];
+            for (value, point) in values.iter_mut().zip(points.points) {
+                *value = legendre(degree, point.u);
+            }
+            points.take_offsets(values);
+            let whole = points.product(values, values);
+            // Odd polynomials go from -1 to 1, even ones return.
+            let mut slope = if degree % 2 == 1 { 1.0 } else { 0.0 };
+            for (other, other_slope) in before.iter().zip(slopes) {
+                let share = points.product(values, other);
+                values.iter_mut().zip(other).for_each(|(v, o)| *v -= share * o);
+                slope -= share * other_slope;
+            }
+            let length2 = points.product(values, values);
+            if length2 <= LEAST_REST * whole || whole <= 0.0 {
+                break;
+            }
+            let scale = 1.0 / sqrt(length2);
+            values.iter_mut().for_each(|value| *value *= scale);
+            slopes[index] = slope * scale;
+            if degree == 2 {
+                // The second derivative of (3 u^2 - 1) / 2.
+                bend = 3.0 * scale;
+            }
+            let coefficient = points.product(values, &rest);
+            rest.iter_mut().zip(values.iter()).for_each(|(r, v)| *r -= coefficient * v);
+            coefficients[index] = coefficient;
+            let degrees_of_freedom = free - degree;
+            let squares = points.product(&rest, &rest);
+            let variance = squares / degrees_of_freedom as f32;
+            let cost = free as f32 * ln(squares.max(f32::MIN_POSITIVE))
+                + DEGREE_COST * degree as f32;
+            let sum = |terms: &mut dyn Iterator<Item = f32>| terms.fold(0.0, |a, b| a + b);
+            let found = Self {
+                slope: sum(&mut slopes.iter().zip(coefficients).map(|(s, c)| s * c)),
+                slope_error: sqrt(variance * sum(&mut slopes.iter().map(|s| s * s))),
+                bend: if degree >= 2 { bend * coefficients[1] } else { 0.0 },
+                bend_error: sqrt(variance) * bend,
+                degree,
+                degrees_of_freedom,
+            };
+            // A parabola always: its bend is asked for.
+            if degree <= 2 || best.is_none_or(|(least, _)| cost < least) {
+                best = Some((cost, found));
+            }
+        }
+        best.map(|(_, found)| found).filter(|found| found.degree >= 2)
+    }
+}
+
+/// Legendre's polynomial.
+fn legendre(degree: usize, u: f32) -> f32 {
+    let (mut before, mut here) = (1.0, u);
+    for k in 1..degree {
+        let k = k as f32;
+        (before, here) = (here, ((2.0 * k + 1.0) * u * here - k * before) / (k + 1.0));
+    }
+    here
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points of y(u) with a sawtooth of noise.
+    fn points(noise: f32, y: impl Fn(f32) -> f32) -> Vec<Point> {
+        (0..40)
+            .map(|i| {
+                let u = (i as f32 - 19.5) / 20.0;
+                let off = noise * ((i * 7 % 11) as f32 - 5.0) / 5.0;
+                Point { u, y: y(u) + off, weight: 1.0 }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_parabola_is_found_with_its_error() {
+        let found = Trend::fit(&points(1e-3, |u| 1.0 + 2.0 * u + 3.0 * u * u), 1);
+        let found = found.unwrap_or_default();
+        assert_eq!(found.degree, 2);
+        assert!((found.slope - 2.0).abs() < 3.0 * found.slope_error, "{found:?}");
+        assert!(found.slope_error < 1e-3, "{found:?}");
+        assert!((found.bend - 6.0).abs() < 3.0 * found.bend_error, "{found:?}");
+    }
+
+    #[test]
+    fn the_mean_slope_of_a_bent_line_is_the_way_between_its_ends() {
+        let wave = |u: f32| 0.3 * u + 0.05 * libm::sinf(5.0 * u + 0.7);
+        let found = Trend::fit(&points(1e-3, wave), 1).unwrap_or_default();
+        let mean = 0.5 * (wave(1.0) - wave(-1.0));
+        assert!(found.degree > 4, "{found:?}");
+        assert!((found.slope - mean).abs() < 3.0 * found.slope_error, "{mean} {found:?}");
+    }
+
+    #[test]
+    fn what_repeats_in_every_period_is_an_offset() {
+        let mut points = points(1e-4, |u| 2.0 * u);
+        for (i, point) in points.iter_mut().enumerate() {
+            point.y += if i % 4 == 0 { 0.5 } else { 0.0 };
+        }
+        let found = Trend::fit(&points, 4).unwrap_or_default();
+        assert!((found.slope - 2.0).abs() < 3.0 * found.slope_error, "{found:?}");
+        assert!(found.slope_error < 1e-3, "{found:?}");
+    }
+
+    #[test]
+    fn too_few_points_give_none() {
+        assert_eq!(Trend::fit(&points(0.1, |u| u)[..6], 1), None);
+        assert_eq!(Trend::fit(&[], 3), None);
+    }
+}
