@@ -37,6 +37,8 @@ pub enum Command {
     StatusPreset,
     /// The recorder.
     Record(Record),
+    /// The pixels on the screen.
+    Hardcopy,
 }
 
 /// Commands of IEEE 488.2.
@@ -261,6 +263,7 @@ pub const COMMANDS: &[(&str, Command)] = table![
     ("SYSTem:FAULt:CLEar", Command::System(System::FaultClear)),
     ("SYSTem:PRESet", Command::System(System::Preset)),
     ("SYSTem:HELP:HEADers?", Command::System(System::Headers)),
+    ("HCOPy:SDUMp:DATA?", Command::Hardcopy),
     ("STATus:PRESet", Command::StatusPreset),
     ("DATA:RECord:STARt", Command::Record(Record::Start)),
     ("DATA:RECord:STOP", Command::Record(Record::Stop)),

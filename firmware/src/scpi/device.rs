@@ -128,6 +128,11 @@ pub trait Device {
     /// The fault has been read.
     fn acknowledge_fault(&mut self);
 
+    /// The pixels on the screen, row by row, each RGB565 in two bytes, little-endian; none without a screen.
+    fn screen(&self) -> &[u8] {
+        &[]
+    }
+
     /// What the recorder does.
     fn recorder(&self) -> RecorderStatus;
 

@@ -162,6 +162,10 @@ impl Link {
         out.fill(0);
         match block.kind {
             BlockKind::Headers => commands::copy_headers(block.sent, out),
+            BlockKind::Screen => {
+                let rest = device.screen().get(block.sent as usize..).unwrap_or_default();
+                out.iter_mut().zip(rest).for_each(|(out, byte)| *out = *byte);
+            }
             BlockKind::Recording => {
                 if device.read_recording(block.sent, out).is_err() {
                     self.session.report(ScpiError { code: ErrorCode::Hardware, byte: None });

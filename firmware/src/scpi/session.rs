@@ -55,6 +55,8 @@ pub enum BlockKind {
     Recording,
     /// The list of headers.
     Headers,
+    /// The pixels on the screen.
+    Screen,
 }
 
 impl Block {
@@ -172,6 +174,11 @@ impl Session {
                 parameters.end()?;
                 self.status.operation.preset();
                 self.status.questionable.preset();
+            }
+            Command::Hardcopy => {
+                parameters.end()?;
+                let length = device.screen().len() as u32;
+                return Ok(Flow::Block(Block::begin(BlockKind::Screen, length, out)));
             }
             Command::Record(record) => return recording::run(record, parameters, device, out),
         }

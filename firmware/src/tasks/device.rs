@@ -108,6 +108,10 @@ impl<R: Recording, P: Panel> Device for Front<R, P> {
         self.instrument.act(Action::Acknowledge);
     }
 
+    fn screen(&self) -> &[u8] {
+        self.panel.bytes()
+    }
+
     fn recorder(&self) -> RecorderStatus {
         self.recording.status()
     }
