@@ -11,3 +11,4 @@ pub mod intake;
 pub mod measure;
 pub mod record;
 pub mod report;
+pub mod ui;

@@ -28,6 +28,8 @@ enum Command {
     Bench(cmd::bench::Args),
     /// A report with pictures.
     Plot(cmd::plot::Args),
+    /// The device's screen as a picture.
+    Screen(cmd::screen::Args),
 }
 
 fn main() -> ExitCode {
@@ -38,6 +40,7 @@ fn main() -> ExitCode {
         Command::Synth(args) => cmd::synth::run(&args),
         Command::Bench(args) => cmd::bench::run(args),
         Command::Plot(args) => cmd::plot::run(args),
+        Command::Screen(args) => cmd::screen::run(&args),
     };
     result.unwrap_or_else(|error| {
         eprintln!("evtach: {error:#}");

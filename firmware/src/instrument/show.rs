@@ -1,11 +1,13 @@
 //! From what was taken in to what is shown.
 
 use evtach_core::Reason;
+use evtach_core::limits::MAX_ROTORS;
+use heapless::Vec;
 
 use super::tally::Rpm;
 use super::{
     Beyond, Instrument, LastSpeed, Mode, Number, Row, Scene, Seen, Sensor, Shown, State,
-    Statistics, View, fresh_us,
+    Statistics, Unit, View, fresh_us,
 };
 
 /// A sensor without an event for this long is silent.
@@ -20,7 +22,7 @@ impl Instrument {
     pub fn view(&self) -> View {
         let state = self.state();
         let failed = matches!(state, State::Fault(_));
-        let statistics = self.statistics();
+        let statistics = self.statistics().filter(|_| !failed);
         let last = self.visible_speed().map(|(last, _)| last);
         let speed = match self.mode {
             _ if failed => None,
@@ -39,7 +41,7 @@ impl Instrument {
             speed,
             direction: last.filter(|_| !failed).map(|last| last.direction),
             blades: self.preferences.blades.or(last.and_then(|last| last.blades)),
-            rotors: self.rows(),
+            rotors: if failed { Vec::new() } else { self.rows() },
             statistics,
             alarm: self.alarm(),
             rate: self.meter.rate,
@@ -125,9 +127,14 @@ impl Instrument {
 
     fn statistics(&self) -> Option<Statistics> {
         let tally = self.tallies.of(self.selected?)?;
+        let (mut max, mut min) = (tally.max, tally.min);
+        if self.preferences.unit == Unit::MsPerTurn {
+            // The slowest turn is the longest.
+            core::mem::swap(&mut max, &mut min);
+        }
         Some(Statistics {
-            max: self.shown(tally.max),
-            min: self.shown(tally.min),
+            max: self.shown(max),
+            min: self.shown(min),
             mean: self.shown(tally.mean()),
             turns_tenths: tally.turns_tenths(),
         })
@@ -140,13 +147,13 @@ impl Instrument {
     }
 
     /// The rotors of the last reading, as long as that stands for the present.
-    fn rows(&self) -> heapless::Vec<Row, { evtach_core::limits::MAX_ROTORS }> {
+    fn rows(&self) -> Vec<Row, MAX_ROTORS> {
         let scene = self.scene();
         let fresh = self.latest.as_ref().filter(|latest| {
             let age_us = scene.now_us.saturating_sub(latest.end_us);
             scene.sensor == Sensor::Present && age_us <= fresh_us(latest.window_us)
         });
-        let Some(latest) = fresh else { return heapless::Vec::new() };
+        let Some(latest) = fresh else { return Vec::new() };
         let speeds = || latest.rotors.iter().filter_map(|seen| seen.rpm);
         let measured = speeds().count();
         let mean_rpm = speeds().map(|rpm| rpm.value).sum::<f32>() / measured.max(1) as f32;
