@@ -7,3 +7,4 @@ pub mod play;
 pub mod recording;
 pub mod report;
 pub mod synth;
+pub mod watch;

@@ -30,6 +30,8 @@ enum Command {
     Plot(cmd::plot::Args),
     /// The device's screen as a picture.
     Screen(cmd::screen::Args),
+    /// A live view in the terminal, of a recording or of a device.
+    Watch(cmd::watch::Args),
 }
 
 fn main() -> ExitCode {
@@ -41,6 +43,7 @@ fn main() -> ExitCode {
         Command::Bench(args) => cmd::bench::run(args),
         Command::Plot(args) => cmd::plot::run(args),
         Command::Screen(args) => cmd::screen::run(&args),
+        Command::Watch(args) => cmd::watch::run(args),
     };
     result.unwrap_or_else(|error| {
         eprintln!("evtach: {error:#}");

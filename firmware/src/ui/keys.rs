@@ -112,7 +112,7 @@ pub fn action_at(view: &View, at: Point) -> Option<Action> {
         }
         Page::Aim => None,
         Page::Main if scene::THUMBNAIL.contains(at) => Some(Action::Page(Page::Aim)),
-        Page::Main => list::rotor_at(view, at).map(Action::Rotor),
+        Page::Main => list::rotor_at(view, at).map(|id| Action::Rotor(Some(id))),
     }
 }
 

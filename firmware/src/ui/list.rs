@@ -67,7 +67,7 @@ fn draw_row<D: DrawTarget<Color = Rgb565>>(
     write_at(target, at(VALUE), speed, Ink { colour, paper })?;
     let dim = Ink { colour: DIM, paper };
     if let Some(direction) = row.direction {
-        theme::draw_sense(target, at(VALUE + 14) - Point::new(0, 5), 5, direction, DIM)?;
+        theme::draw_sense(target, at(VALUE + 11) - Point::new(0, 5), 4, direction, DIM)?;
     }
     if let Some(permille) = row.off_mean_permille {
         let mut off = String::<12>::new();

@@ -7,3 +7,4 @@ pub mod measure;
 pub mod plot;
 pub mod screen;
 pub mod synth;
+pub mod watch;
