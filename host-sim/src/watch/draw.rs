@@ -148,7 +148,7 @@ fn rotor_table(reading: &ReadingRow) -> Table<'_> {
                 .style(Style::new().fg(colour(&rotor.status, true))),
         ])
     });
-    let widths = [2, 9, 7, 14, 20, 14].map(Constraint::Length);
+    let widths = [2, 9, 6, 14, 18, 14].map(Constraint::Length);
     let header = ["", "      rpm", "±", "turning", "place, px", "state"];
     let header = Row::new(header).style(Style::new().add_modifier(Modifier::DIM));
     Table::new(rows, widths).header(header).block(Block::bordered().title("rotors"))

@@ -1,6 +1,6 @@
 //! Where readings come from: a recording at its own pace, or a device at a serial port.
 
-use std::io::{self, Read as _, Write as _};
+use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -154,10 +154,11 @@ pub fn port(path: &Path, baud: u32) -> Result<Source, SourceError> {
         Ok(port)
     });
     let port = opened.map_err(|source| SourceError::Open { path: path.into(), source })?;
-    Ok(watch_port(port))
+    Ok(listen_to(port))
 }
 
-fn watch_port(mut port: SerialPort) -> Source {
+/// The same over any stream of bytes whose reads end after [`PATIENCE`].
+fn listen_to(mut port: impl Read + Write + Send + 'static) -> Source {
     Source::start(move |teller| {
         if let Err(error) = listen(&mut port, teller) {
             teller.tell(Told::End(format!("the port failed: {error}; check the cable")));
@@ -166,15 +167,17 @@ fn watch_port(mut port: SerialPort) -> Source {
     })
 }
 
-fn listen(port: &mut SerialPort, teller: &Teller) -> io::Result<()> {
+fn listen(port: &mut (impl Read + Write), teller: &Teller) -> io::Result<()> {
     port.write_all(b"SYST:LOG ON\n")?;
     let mut line: Vec<u8> = Vec::new();
     let mut bytes = [0; 512];
     while !teller.stopped() {
         let count = match port.read(&mut bytes) {
-            Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
+            Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
             Ok(count) => count,
-            Err(error) if error.kind() == io::ErrorKind::TimedOut => continue,
+            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock) => {
+                continue;
+            }
             Err(error) => return Err(error),
         };
         for byte in &bytes[..count] {
@@ -209,19 +212,21 @@ fn parse(line: &[u8]) -> Option<Told> {
     })
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
+    use std::os::unix::net::UnixStream;
+
     use super::*;
+    use crate::recording::{self, OpenOptions, RecordingError};
 
     const LINE: &str = r#"{"t_s":1.25,"window_s":0.15,"status":"locked","reason":null,"rotors":[{"id":"A","x_px":167.5,"y_px":146.0,"radius_px":55.0,"rpm":1180.3,"rpm_sigma":0.63,"direction":"cw","blades":5,"accel_rpm_per_s":null,"frame":"camera","status":"locked","reason":null}]}"#;
 
     #[test]
     fn a_device_is_asked_for_its_log_heard_and_left_in_quiet() -> io::Result<()> {
-        let (ours, mut device) = SerialPort::pair()?;
-        device.set_read_timeout(Duration::from_secs(5))?;
-        let mut ours = ours;
-        ours.set_read_timeout(PATIENCE)?;
-        let source = watch_port(ours);
+        let (ours, mut device) = UnixStream::pair()?;
+        device.set_read_timeout(Some(Duration::from_secs(5)))?;
+        ours.set_read_timeout(Some(PATIENCE))?;
+        let source = listen_to(ours);
         let mut asked = [0; 12];
         device.read_exact(&mut asked)?;
         assert_eq!(&asked, b"SYST:LOG ON\n");
@@ -248,6 +253,32 @@ mod tests {
     fn the_line_is_the_object_that_measure_prints() -> serde_json::Result<()> {
         let reading: ReadingRow = serde_json::from_str(LINE)?;
         assert_eq!(serde_json::to_string(&reading)?, LINE);
+        Ok(())
+    }
+
+    #[test]
+    fn a_recording_tells_its_readings_then_that_it_has_ended() -> Result<(), RecordingError> {
+        let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../demo/fan.raw");
+        let source = file(recording::open(&demo, &OpenOptions::default())?, 1e6);
+        let told: Vec<Told> = source.told.iter().collect();
+        let (last, readings) = told.split_last().expect("something was told");
+        assert_eq!(last, &Told::End("the recording has ended".into()));
+        assert!(
+            readings
+                .iter()
+                .all(|told| matches!(told, Told::Reading(row) if row.rotors[0].rpm.is_some()))
+        );
+        assert!(!readings.is_empty());
+        Ok(())
+    }
+
+    #[test]
+    fn a_view_that_is_closed_early_stops_its_source() -> Result<(), RecordingError> {
+        let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../demo/fan.raw");
+        let start = Instant::now();
+        // Two minutes long at this speed.
+        drop(file(recording::open(&demo, &OpenOptions::default())?, 0.001));
+        assert!(start.elapsed() < Duration::from_secs(30));
         Ok(())
     }
 }
