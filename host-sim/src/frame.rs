@@ -69,7 +69,8 @@ impl Frame {
     pub fn write_png(&self, path: &Path) -> Result<(), FrameError> {
         let failed = |source| FrameError::File { path: path.into(), source };
         let mut file = BufWriter::new(File::create(path).map_err(failed)?);
-        self.encode(&mut file).map_err(|source| FrameError::Encode { path: path.into(), source })?;
+        self.encode(&mut file)
+            .map_err(|source| FrameError::Encode { path: path.into(), source })?;
         file.flush().map_err(failed)
     }
 
@@ -102,9 +103,7 @@ impl Frame {
     }
 }
 
-fn decode(
-    file: impl std::io::BufRead + Seek,
-) -> Result<Option<Vec<Rgb565>>, png::DecodingError> {
+fn decode(file: impl std::io::BufRead + Seek) -> Result<Option<Vec<Rgb565>>, png::DecodingError> {
     let mut reader = png::Decoder::new(file).read_info()?;
     let info = reader.info();
     let ours = (info.width, info.height, info.color_type, info.bit_depth)

@@ -27,7 +27,8 @@ struct Rotor {
     blades: u8,
 }
 
-const FAN: [Rotor; 1] = [Rotor { rpm: 1180.27, x_px: 168.0, y_px: 128.0, radius_px: 78.0, blades: 5 }];
+const FAN: [Rotor; 1] =
+    [Rotor { rpm: 1180.27, x_px: 168.0, y_px: 128.0, radius_px: 78.0, blades: 5 }];
 
 const fn arm(rpm: f32, x_px: f32, y_px: f32) -> Rotor {
     Rotor { rpm, x_px, y_px, radius_px: 38.0, blades: 2 }
@@ -82,6 +83,51 @@ pub fn all() -> Vec<Scene> {
     scenes
 }
 
+/// One instrument through every state, mode, unit and page, shown to `look` after each step.
+pub fn play(mut look: impl FnMut(&Instrument)) {
+    let mut instrument = Instrument::new(Preferences::default());
+    look(&instrument);
+    instrument.set_sensor(Sensor::Present);
+    look(&instrument);
+    let mut now_us = 1_000_000;
+    let pages = [Page::Main, Page::Aim, Page::Settings, Page::Main];
+    let asked = Unit::ALL.map(Action::Unit).into_iter().chain(Mode::ALL.map(Action::Mode));
+    let actions = asked.chain([
+        Action::NextRotor,
+        Action::BladesTwice,
+        Action::Step(Setting::AlarmHigh, Step::Less),
+        Action::ClockTrim(3.0),
+        Action::Reset,
+        Action::Mode(Mode::Live),
+    ]);
+    let mut step = |instrument: &mut Instrument, status, rotors: &[Rotor], events_per_s| {
+        now_us += 300_000;
+        let lost = if status == Status::Refused(Reason::Saturated) { now_us } else { 0 };
+        instrument.tick(now_us, Traffic { events: now_us * events_per_s / 1_000_000, lost });
+        instrument.show_picture(&picture(rotors));
+        instrument.observe(&reading(now_us, status, rotors, 5e-4));
+        look(instrument);
+    };
+    for action in actions {
+        step(&mut instrument, Status::Locked, &FAN, 420_000);
+        instrument.act(action);
+        for page in pages {
+            instrument.act(Action::Page(page));
+            step(&mut instrument, Status::Locked, &HEXACOPTER, 1_700_000);
+        }
+    }
+    for reason in Reason::ALL {
+        step(&mut instrument, Status::Refused(reason), &FAN, 9_000);
+        step(&mut instrument, Status::Coarse, &HEXACOPTER[..2], 90_000);
+    }
+    for fault in Fault::ALL {
+        instrument.fail(fault);
+        step(&mut instrument, Status::Locked, &FAN, 420_000);
+        instrument.act(Action::Acknowledge);
+        step(&mut instrument, Status::Locked, &FAN, 420_000);
+    }
+}
+
 fn scene(name: &str, instrument: Instrument) -> Scene {
     Scene { name: name.into(), instrument }
 }
@@ -116,8 +162,7 @@ fn held() -> Instrument {
 }
 
 fn alarm(low_rpm: Option<f32>, high_rpm: Option<f32>) -> Instrument {
-    let preferences =
-        Preferences { alarm: Alarm { low_rpm, high_rpm }, ..Preferences::default() };
+    let preferences = Preferences { alarm: Alarm { low_rpm, high_rpm }, ..Preferences::default() };
     series(instrument_of(preferences, &FAN, 420_000), &FAN, 5e-4)
 }
 
@@ -174,7 +219,10 @@ fn series(mut instrument: Instrument, rotors: &[Rotor], relative_sigma: f32) -> 
     for step in (0..64).rev() {
         let wavering: Vec<Rotor> = rotors
             .iter()
-            .map(|rotor| Rotor { rpm: rotor.rpm * (1.0 + relative_sigma * noise.about_zero()), ..*rotor })
+            .map(|rotor| Rotor {
+                rpm: rotor.rpm * (1.0 + relative_sigma * noise.about_zero()),
+                ..*rotor
+            })
             .collect();
         let shown = if step == 0 { rotors } else { &wavering };
         let end_us = NOW_US - step * 150_000;

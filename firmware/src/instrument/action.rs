@@ -102,8 +102,8 @@ pub enum Action {
     Unit(Unit),
     /// The next rotor in the list for the big number.
     NextRotor,
-    /// This rotor (0 is A) for the big number.
-    Rotor(u8),
+    /// This rotor (0 is A) for the big number; `None` lets the device choose.
+    Rotor(Option<u8>),
     /// This blade number, 1 to 32; `None`: find it.
     Blades(Option<u8>),
     /// Twice the blade number: the speed shown was twice the true one.
@@ -133,7 +133,8 @@ impl Instrument {
             Action::NextUnit => self.preferences.unit = self.preferences.unit.next(),
             Action::Unit(unit) => self.preferences.unit = unit,
             Action::NextRotor => self.select_next(),
-            Action::Rotor(id) => self.select(id),
+            Action::Rotor(Some(id)) => self.select(id),
+            Action::Rotor(None) => self.chosen = false,
             Action::Blades(blades) => self.set_blades(blades),
             Action::BladesTwice => {
                 let blades = self.blades().unwrap_or(1).saturating_mul(2);
@@ -169,7 +170,7 @@ impl Instrument {
     /// The rotor after the one shown, in the order of the list.
     fn select_next(&mut self) {
         let Some(latest) = &self.latest else { return };
-        let ids = || latest.rotors.iter().map(|seen| seen.rotor.id);
+        let ids = || latest.rotors.iter().map(|rotor| rotor.id);
         let next = ids().find(|id| Some(*id) > self.selected).or_else(|| ids().next());
         if let Some(id) = next {
             self.select(id);

@@ -14,16 +14,14 @@ mod traffic;
 mod trend;
 mod view;
 
-use evtach_core::limits::MAX_ROTORS;
-use evtach_core::{Direction, Reading, RotorReading, Status};
-use heapless::Vec;
+use evtach_core::{Direction, Reading, Status};
 
 pub use action::{Action, Mode, Page, Setting, Step};
 pub use number::Number;
 pub use picture::{BRIGHTEST, Picture};
 pub use preferences::{Alarm, Beyond, MAX_BLADES, MAX_TRIM_PPM, Preferences, Unit};
 pub use state::State;
-pub use tally::Collected;
+pub use tally::Tally;
 pub use traffic::{Rate, SATURATION_EV_S, Traffic};
 pub use trend::{TREND_POINTS, Trend, TrendPoint};
 pub use view::{Row, Shown, Statistics, View};
@@ -56,13 +54,6 @@ pub enum Sensor {
     Present,
 }
 
-/// A rotor of the last reading, corrected by the clock trim.
-#[derive(Clone, Debug)]
-struct Seen {
-    rotor: RotorReading,
-    rpm: Option<Rpm>,
-}
-
 /// The last speed of the rotor that the big number shows.
 #[derive(Clone, Copy, Debug)]
 struct LastSpeed {
@@ -73,16 +64,6 @@ struct LastSpeed {
     /// End of its window in sensor time.
     end_us: u64,
     window_us: u32,
-}
-
-/// The last reading, as far as it is shown.
-#[derive(Debug)]
-struct Latest {
-    t_us: u64,
-    end_us: u64,
-    window_us: u32,
-    status: Status,
-    rotors: Vec<Seen, MAX_ROTORS>,
 }
 
 /// What a reading is judged by, apart from what it says.
@@ -110,7 +91,9 @@ pub struct Instrument {
     selected: Option<u8>,
     /// Whether the person chose the rotor: then it stays, even when it is gone.
     chosen: bool,
-    latest: Option<Latest>,
+    /// The last reading, its speeds corrected by the clock trim.
+    latest: Option<Reading>,
+    readings: u32,
     last_speed: Option<LastSpeed>,
     tallies: Tallies,
     trend: Trend,
@@ -140,6 +123,7 @@ impl Instrument {
             selected: None,
             chosen: false,
             latest: None,
+            readings: 0,
             last_speed: None,
             tallies: Tallies::NEW,
             trend: Trend::NEW,
@@ -157,30 +141,55 @@ impl Instrument {
         &self.preferences
     }
 
-    /// The fault that is shown.
+    /// Takes over preferences as a whole; what is out of range stays as it was.
+    pub fn set_preferences(&mut self, preferences: Preferences) {
+        let Preferences { unit, alarm, blades, clock_trim_ppm } = preferences;
+        self.act(Action::Unit(unit));
+        self.act(Action::Alarm(alarm));
+        self.act(Action::Blades(blades));
+        self.act(Action::ClockTrim(clock_trim_ppm));
+    }
+
+    /// Whether a sensor answers.
+    #[must_use]
+    pub const fn sensor(&self) -> Sensor {
+        self.sensor
+    }
+
+    /// What happened to the device and has not been acknowledged.
     #[must_use]
     pub const fn fault(&self) -> Option<Fault> {
         self.fault
     }
 
-    /// Which value the big number shows.
+    /// The last reading, or the one that is held, its speeds corrected by the clock trim; however old it is.
     #[must_use]
-    pub const fn mode(&self) -> Mode {
-        self.mode
+    pub const fn reading(&self) -> Option<&Reading> {
+        self.latest.as_ref()
     }
 
-    /// The rotor that was asked for; `None`: the instrument chooses.
+    /// Readings so far; wraps.
+    #[must_use]
+    pub const fn readings(&self) -> u32 {
+        self.readings
+    }
+
+    /// Time of the first reading in sensor time, in microseconds.
+    #[must_use]
+    pub const fn first_us(&self) -> Option<u64> {
+        self.first_us
+    }
+
+    /// What is remembered of the rotor that the big number shows, since the last reset.
+    #[must_use]
+    pub fn tally(&self) -> Option<&Tally> {
+        self.tallies.of(self.selected?)
+    }
+
+    /// The rotor that was asked for; `None`: the device chooses.
     #[must_use]
     pub const fn chosen(&self) -> Option<u8> {
         if self.chosen { self.selected } else { None }
-    }
-
-    /// Shows this rotor; `None` leaves the choice to the instrument.
-    pub fn choose(&mut self, rotor: Option<u8>) {
-        match rotor {
-            Some(id) => self.act(Action::Rotor(id)),
-            None => self.chosen = false,
-        }
     }
 
     /// The last readings of the rotor that the big number shows.
@@ -218,12 +227,17 @@ impl Instrument {
 
     /// Takes in a reading; while the screen is held, it goes into max, min, mean, revolutions and alarm only.
     pub fn observe(&mut self, reading: &Reading) {
-        let trim_ppm = self.preferences.clock_trim_ppm;
-        let rpm = |rotor: &RotorReading| rotor.speed.as_ref().map(|s| Rpm::of(s, trim_ppm));
-        let measured = || reading.rotors.iter().filter_map(|r| Some((r.id, rpm(r)?)));
+        let mut reading = reading.clone();
+        let trim = 1.0 + self.preferences.clock_trim_ppm * 1e-6;
+        for speed in reading.rotors.iter_mut().filter_map(|rotor| rotor.speed.as_mut()) {
+            // A clock that runs fast counts too many microseconds a turn.
+            speed.omega_rad_s *= trim;
+            speed.omega_sigma_rad_s *= trim;
+        }
+        self.readings = self.readings.wrapping_add(1);
+        let measured = || reading.rotors.iter().filter_map(|r| Some((r.id, Rpm::of(r)?)));
         self.tallies.add(reading.t_us, measured());
-        let end_us = reading.t_us.saturating_add(u64::from(reading.window_us / 2));
-        let until_us = end_us.saturating_add(fresh_us(reading.window_us));
+        let until_us = end_us(&reading).saturating_add(fresh_us(reading.window_us));
         let alarm = self.preferences.alarm;
         self.alarm =
             measured().find_map(|(id, rpm)| Some((id, alarm.beyond(rpm.value)?, until_us)));
@@ -235,18 +249,15 @@ impl Instrument {
             (self.first_us, self.last_speed, self.now_us) = (None, None, 0);
             self.clear_trend();
         }
-        self.now_us = self.now_us.max(end_us);
-        self.first_us.get_or_insert(reading.t_us);
-        let rotors = reading.rotors.iter();
-        let rotors = rotors.map(|rotor| Seen { rotor: rotor.clone(), rpm: rpm(rotor) }).collect();
-        let Reading { t_us, window_us, status, .. } = *reading;
-        self.latest = Some(Latest { t_us, end_us, window_us, status, rotors });
+        let t_us = reading.t_us;
+        self.now_us = self.now_us.max(end_us(&reading));
+        self.first_us.get_or_insert(t_us);
+        self.latest = Some(reading);
         self.choose_rotor();
-        self.last_speed = self.latest_speed().or(self.last_speed.take());
-        if let Some(LastSpeed { rpm, end_us: of_us, .. }) = self.last_speed
-            && of_us == end_us
-        {
-            self.trend.push(TrendPoint { t_us, rpm: rpm.value, rpm_sigma: rpm.sigma });
+        if let Some(speed) = self.latest_speed() {
+            self.last_speed = Some(speed);
+            let Rpm { value, sigma } = speed.rpm;
+            self.trend.push(TrendPoint { t_us, rpm: value, rpm_sigma: sigma });
             self.trends = self.trends.wrapping_add(1);
         }
     }
@@ -255,11 +266,11 @@ impl Instrument {
     fn choose_rotor(&mut self) {
         let shown = self.selected.is_some() && (self.chosen || self.visible_speed().is_some());
         let Some(latest) = &self.latest else { return };
-        let measured = latest.rotors.iter().find(|seen| seen.rpm.is_some());
-        if let Some(seen) = measured.or(latest.rotors.first())
+        let measured = latest.rotors.iter().find(|rotor| rotor.speed.is_some());
+        if let Some(rotor) = measured.or(latest.rotors.first())
             && !shown
         {
-            self.show_rotor(seen.rotor.id);
+            self.show_rotor(rotor.id);
         }
     }
 
@@ -273,12 +284,16 @@ impl Instrument {
 
     /// The speed that the last reading gives for the rotor shown.
     fn latest_speed(&self) -> Option<LastSpeed> {
-        let Latest { end_us, window_us, rotors, .. } = self.latest.as_ref()?;
-        let seen = rotors.iter().find(|seen| Some(seen.rotor.id) == self.selected)?;
-        let RotorReading { status, blades, speed, .. } = &seen.rotor;
-        let direction = speed.as_ref()?.direction();
-        let (rpm, blades, status) = (seen.rpm?, *blades, *status);
-        Some(LastSpeed { rpm, direction, blades, status, end_us: *end_us, window_us: *window_us })
+        let latest = self.latest.as_ref()?;
+        let rotor = latest.rotors.iter().find(|rotor| Some(rotor.id) == self.selected)?;
+        Some(LastSpeed {
+            rpm: Rpm::of(rotor)?,
+            direction: rotor.speed.as_ref()?.direction(),
+            blades: rotor.blades,
+            status: rotor.status,
+            end_us: end_us(latest),
+            window_us: latest.window_us,
+        })
     }
 
     fn clear_trend(&mut self) {
@@ -290,6 +305,11 @@ impl Instrument {
         self.tallies.clear();
         self.clear_trend();
     }
+}
+
+/// When the window of a reading ends.
+fn end_us(reading: &Reading) -> u64 {
+    reading.t_us.saturating_add(u64::from(reading.window_us / 2))
 }
 
 /// How long a reading stands for the present: two windows, and a second at least.

@@ -1,11 +1,13 @@
 //! From what was taken in to what is shown.
 
-use evtach_core::Reason;
+use evtach_core::limits::MAX_ROTORS;
+use evtach_core::{Reason, RotorReading};
+use heapless::Vec;
 
-use super::tally::{Collected, Rpm, Tally};
+use super::tally::Rpm;
 use super::{
-    Beyond, Instrument, LastSpeed, Mode, Number, Row, Scene, Seen, Sensor, Shown, State,
-    Statistics, View, fresh_us,
+    Beyond, Instrument, LastSpeed, Mode, Number, Row, Scene, Sensor, Shown, State, Statistics,
+    Unit, View, end_us, fresh_us,
 };
 
 /// A sensor without an event for this long is silent.
@@ -20,7 +22,7 @@ impl Instrument {
     pub fn view(&self) -> View {
         let state = self.state();
         let failed = matches!(state, State::Fault(_));
-        let statistics = self.statistics();
+        let statistics = self.statistics().filter(|_| !failed);
         let last = self.visible_speed().map(|(last, _)| last);
         let speed = match self.mode {
             _ if failed => None,
@@ -39,7 +41,7 @@ impl Instrument {
             speed,
             direction: last.filter(|_| !failed).map(|last| last.direction),
             blades: self.preferences.blades.or(last.and_then(|last| last.blades)),
-            rotors: self.rows(),
+            rotors: if failed { Vec::new() } else { self.rows() },
             statistics,
             alarm: self.alarm(),
             rate: self.meter.rate,
@@ -77,7 +79,7 @@ impl Instrument {
     pub(super) fn visible_speed(&self) -> Option<(LastSpeed, bool)> {
         let scene = self.scene();
         let last = self.last_speed.filter(|_| scene.sensor == Sensor::Present)?;
-        let newest = self.latest.as_ref().is_some_and(|latest| latest.end_us == last.end_us);
+        let newest = self.latest.as_ref().is_some_and(|latest| end_us(latest) == last.end_us);
         let age_us = scene.now_us.saturating_sub(last.end_us);
         let fresh_us = fresh_us(last.window_us);
         let seen_us = if newest { 2 * fresh_us } else { fresh_us };
@@ -104,15 +106,15 @@ impl Instrument {
 
     /// Why there is no speed of the rotor shown.
     fn refusal(&self, scene: &Scene) -> Reason {
-        let age_us = |end_us| scene.now_us.saturating_sub(end_us);
-        let Some(latest) = self.latest.as_ref().filter(|l| age_us(l.end_us) <= OLD_READING_US)
+        let age_us = |reading| scene.now_us.saturating_sub(end_us(reading));
+        let Some(latest) = self.latest.as_ref().filter(|latest| age_us(latest) <= OLD_READING_US)
         else {
             return Reason::Searching;
         };
-        let shown = latest.rotors.iter().find(|seen| Some(seen.rotor.id) == self.selected);
+        let shown = latest.rotors.iter().find(|rotor| Some(rotor.id) == self.selected);
         match shown {
             // A speed, but too old: the next reading takes its time.
-            Some(seen) => seen.rotor.status.reason().unwrap_or(Reason::Searching),
+            Some(rotor) => rotor.status.reason().unwrap_or(Reason::Searching),
             // Other rotors may have a speed, but this one has gone.
             None => latest.status.reason().unwrap_or(Reason::NoRotation),
         }
@@ -125,45 +127,45 @@ impl Instrument {
         Some(Shown { value, error: Number::of_error(sigma)? })
     }
 
-    /// What has been collected of the rotor that the big number shows, since the last reset.
-    #[must_use]
-    pub fn collected(&self) -> Option<Collected> {
-        self.tallies.of(self.selected?).map(Tally::collected)
-    }
-
     fn statistics(&self) -> Option<Statistics> {
-        let tally = self.tallies.of(self.selected?)?;
+        let tally = self.tally()?;
+        let (mut max, mut min) = (tally.max, tally.min);
+        if self.preferences.unit == Unit::MsPerTurn {
+            // The slowest turn is the longest.
+            core::mem::swap(&mut max, &mut min);
+        }
         Some(Statistics {
-            max: self.shown(tally.max),
-            min: self.shown(tally.min),
+            max: self.shown(max),
+            min: self.shown(min),
             mean: self.shown(tally.mean()),
             turns_tenths: tally.turns_tenths(),
         })
     }
 
-    /// The alarm of the last reading, as long as that stands for the present.
-    fn alarm(&self) -> Option<(u8, Beyond)> {
+    /// The first rotor beyond a limit, as long as the last reading stands for the present.
+    #[must_use]
+    pub fn alarm(&self) -> Option<(u8, Beyond)> {
         let (id, beyond, until_us) = self.alarm?;
         (self.now_us <= until_us && self.sensor == Sensor::Present).then_some((id, beyond))
     }
 
     /// The rotors of the last reading, as long as that stands for the present.
-    fn rows(&self) -> heapless::Vec<Row, { evtach_core::limits::MAX_ROTORS }> {
+    fn rows(&self) -> Vec<Row, MAX_ROTORS> {
         let scene = self.scene();
         let fresh = self.latest.as_ref().filter(|latest| {
-            let age_us = scene.now_us.saturating_sub(latest.end_us);
+            let age_us = scene.now_us.saturating_sub(end_us(latest));
             scene.sensor == Sensor::Present && age_us <= fresh_us(latest.window_us)
         });
-        let Some(latest) = fresh else { return heapless::Vec::new() };
-        let speeds = || latest.rotors.iter().filter_map(|seen| seen.rpm);
+        let Some(latest) = fresh else { return Vec::new() };
+        let speeds = || latest.rotors.iter().filter_map(Rpm::of);
         let measured = speeds().count();
         let mean_rpm = speeds().map(|rpm| rpm.value).sum::<f32>() / measured.max(1) as f32;
         let mean_rpm = (measured > 1).then_some(mean_rpm);
-        latest.rotors.iter().map(|seen| self.row(seen, mean_rpm)).collect()
+        latest.rotors.iter().map(|rotor| self.row(rotor, mean_rpm)).collect()
     }
 
-    fn row(&self, seen: &Seen, mean_rpm: Option<f32>) -> Row {
-        let Seen { rotor, rpm } = seen;
+    fn row(&self, rotor: &RotorReading, mean_rpm: Option<f32>) -> Row {
+        let rpm = Rpm::of(rotor);
         let off_mean = rpm.zip(mean_rpm).map(|(rpm, mean)| (rpm.value / mean - 1.0) * 1e3);
         let half = |off: f32| if off < 0.0 { off - 0.5 } else { off + 0.5 };
         Row {

@@ -52,9 +52,8 @@ impl State {
     #[must_use]
     pub const fn advice(self) -> &'static str {
         match self {
-            Self::Locked => "",
-            Self::Coarse => "a longer look gives a smaller error",
-            Self::Held => "the last speed; no new one since",
+            Self::Locked | Self::Coarse => "",
+            Self::Held => "the last speed, no new one since",
             Self::Refused(reason) => reason.advice(),
             Self::Fault(fault) => fault.advice(),
         }
@@ -85,25 +84,14 @@ impl Fault {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Panic, Self::Exception, Self::Watchdog, Self::Preferences];
 
-    /// What happened, in a few words.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Panic => "the program stopped itself",
-            Self::Exception => "the processor stopped the program",
-            Self::Watchdog => "a task hung",
-            Self::Preferences => "the settings were damaged",
-        }
-    }
-
-    /// What the person can do about it.
+    /// What happened, and what the person can do about it.
     #[must_use]
     pub const fn advice(self) -> &'static str {
         match self {
-            Self::Panic | Self::Exception | Self::Watchdog => {
-                "the device has restarted: press OK to go on"
-            }
-            Self::Preferences => "the defaults stand: press OK, then check the settings",
+            Self::Panic => "the program stopped itself and has restarted: press OK",
+            Self::Exception => "the processor stopped the program; restarted: press OK",
+            Self::Watchdog => "a task hung and the device has restarted: press OK",
+            Self::Preferences => "the settings were damaged, the defaults stand: press OK",
         }
     }
 }

@@ -2,8 +2,8 @@
 
 use core::f32::consts::TAU;
 
-use evtach_core::Speed;
 use evtach_core::limits::MAX_ROTORS;
+use evtach_core::{RotorReading, Speed};
 use heapless::Vec;
 
 /// A speed with its standard error, both in revolutions per minute.
@@ -14,36 +14,19 @@ pub(super) struct Rpm {
 }
 
 impl Rpm {
-    /// The magnitude of a speed, corrected for a sensor clock that runs fast by `trim_ppm`: such a clock counts too
-    /// many microseconds a turn.
-    pub fn of(speed: &Speed, trim_ppm: f32) -> Self {
-        let trim = 1.0 + trim_ppm * 1e-6;
-        Self { value: speed.rpm() * trim, sigma: speed.rpm_sigma() * trim }
+    /// The magnitude of a rotor's speed.
+    pub fn of(rotor: &RotorReading) -> Option<Self> {
+        let speed = rotor.speed.as_ref()?;
+        Some(Self { value: speed.rpm(), sigma: speed.rpm_sigma() })
     }
 }
 
-/// What has been collected of a rotor since the last reset, every digit of it.
+/// What is remembered of one rotor since the last reset.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Collected {
-    /// Largest reading in revolutions per minute.
-    pub max_rpm: f32,
-    /// Smallest reading in revolutions per minute.
-    pub min_rpm: f32,
-    /// Mean of the readings in revolutions per minute.
-    pub mean_rpm: f32,
-    /// Readings.
-    pub readings: u32,
-    /// Revolutions while it was measured, in tenths.
-    pub turns_tenths: u64,
-}
-
-/// One rotor since the last reset.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Tally {
-    pub id: u8,
-    pub max: Rpm,
-    pub min: Rpm,
+pub struct Tally {
+    id: u8,
+    pub(super) max: Rpm,
+    pub(super) min: Rpm,
     mean_rpm: f32,
     mean_variance: f32,
     readings: u32,
@@ -93,21 +76,42 @@ impl Tally {
 
     /// Mean of the readings. Its error is that of one reading: windows overlap and share one clock, so that many
     /// readings do not make it much smaller.
-    pub fn mean(&self) -> Rpm {
+    pub(super) fn mean(&self) -> Rpm {
         Rpm { value: self.mean_rpm, sigma: evtach_core::math::sqrt(self.mean_variance) }
     }
 
-    pub const fn collected(&self) -> Collected {
-        Collected {
-            max_rpm: self.max.value,
-            min_rpm: self.min.value,
-            mean_rpm: self.mean_rpm,
-            readings: self.readings,
-            turns_tenths: self.turns_tenths(),
-        }
+    /// Fastest reading in revolutions per minute.
+    #[must_use]
+    pub const fn max_rpm(&self) -> f32 {
+        self.max.value
+    }
+
+    /// Slowest reading in revolutions per minute.
+    #[must_use]
+    pub const fn min_rpm(&self) -> f32 {
+        self.min.value
+    }
+
+    /// Mean of the readings in revolutions per minute.
+    #[must_use]
+    pub const fn mean_rpm(&self) -> f32 {
+        self.mean_rpm
+    }
+
+    /// Readings within.
+    #[must_use]
+    pub const fn readings(&self) -> u32 {
+        self.readings
+    }
+
+    /// Millionths of revolutions while the rotor was measured.
+    #[must_use]
+    pub const fn micro_turns(&self) -> u64 {
+        self.micro_turns
     }
 
     /// Tenths of revolutions while the rotor was measured.
+    #[must_use]
     pub const fn turns_tenths(&self) -> u64 {
         self.micro_turns.saturating_add(50_000) / 100_000
     }

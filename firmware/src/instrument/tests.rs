@@ -441,7 +441,7 @@ fn any_input() -> impl Strategy<Value = Input> {
         Just(Action::Reset),
         Just(Action::NextUnit),
         Just(Action::NextRotor),
-        any::<u8>().prop_map(Action::Rotor),
+        prop::option::of(any::<u8>()).prop_map(Action::Rotor),
         prop::option::of(any::<u8>()).prop_map(Action::Blades),
         Just(Action::BladesTwice),
         Just(Action::BladesHalf),

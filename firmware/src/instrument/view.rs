@@ -42,13 +42,13 @@ pub struct Row {
     pub beyond: Option<Beyond>,
 }
 
-/// Extremes and mean of the rotor that the big number shows, since the last reset.
+/// Extremes and mean of the rotor that the big number shows, since the last reset, in the chosen unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Statistics {
-    /// Largest reading.
+    /// Largest value: in milliseconds the slowest turn.
     pub max: Option<Shown>,
-    /// Smallest reading.
+    /// Smallest value.
     pub min: Option<Shown>,
     /// Mean of the readings.
     pub mean: Option<Shown>,

@@ -24,7 +24,7 @@ impl<R: Recording, P: Panel> Device for Front<R, P> {
                 Reason::NoSensor | Reason::NoEvents | Reason::Searching | Reason::Fault
             ),
         };
-        self.reading.as_ref().filter(|_| shown)
+        self.instrument.reading().filter(|_| shown)
     }
 
     fn reason(&self) -> Reason {
@@ -32,28 +32,28 @@ impl<R: Recording, P: Panel> Device for Front<R, P> {
     }
 
     fn readings(&self) -> u32 {
-        self.readings
+        self.instrument.readings()
     }
 
     fn first_us(&self) -> u64 {
-        self.first_us.unwrap_or_default()
+        self.instrument.first_us().unwrap_or_default()
     }
 
     fn alarm(&self) -> bool {
-        self.instrument.view().alarm.is_some()
+        self.instrument.alarm().is_some()
     }
 
     fn statistics(&self) -> Option<Statistics> {
-        self.instrument.collected().map(|collected| Statistics {
-            max_rpm: collected.max_rpm,
-            min_rpm: collected.min_rpm,
-            mean_rpm: collected.mean_rpm,
-            readings: collected.readings,
+        self.instrument.tally().map(|tally| Statistics {
+            max_rpm: tally.max_rpm(),
+            min_rpm: tally.min_rpm(),
+            mean_rpm: tally.mean_rpm(),
+            readings: tally.readings(),
         })
     }
 
     fn revolutions(&self) -> Option<f32> {
-        self.instrument.collected().map(|collected| collected.turns_tenths as f32 / 10.0)
+        self.instrument.tally().map(|tally| tally.micro_turns() as f32 * 1e-6)
     }
 
     fn clear_statistics(&mut self) {
@@ -65,7 +65,7 @@ impl<R: Recording, P: Panel> Device for Front<R, P> {
     }
 
     fn select(&mut self, rotor: Option<u8>) {
-        self.instrument.choose(rotor);
+        self.instrument.act(Action::Rotor(rotor));
     }
 
     fn selected(&self) -> Option<u8> {
@@ -77,15 +77,7 @@ impl<R: Recording, P: Panel> Device for Front<R, P> {
     }
 
     fn set_preferences(&mut self, preferences: Preferences) {
-        let Preferences { unit, alarm, blades, clock_trim_ppm } = preferences;
-        for action in [
-            Action::Unit(unit),
-            Action::Alarm(alarm),
-            Action::Blades(blades),
-            Action::ClockTrim(clock_trim_ppm),
-        ] {
-            self.instrument.act(action);
-        }
+        self.instrument.set_preferences(preferences);
     }
 
     fn geometry(&self) -> Option<Geometry> {

@@ -3,11 +3,11 @@
 use embassy_time::Instant;
 use embedded_graphics::pixelcolor::Rgb565;
 use embedded_graphics::prelude::DrawTarget;
-use evtach_core::{Geometry, Reading};
+use evtach_core::Geometry;
 use heapless::String;
 
 use super::shared::{Shared, Wanted};
-use crate::instrument::{Action, Fault, Instrument, Mode, Preferences, Sensor, Traffic};
+use crate::instrument::{Action, Fault, Instrument, Preferences, Sensor, Traffic};
 use crate::kept::{KeptFault, TEXT_BYTES};
 use crate::scpi::{RecorderFailed, RecorderStatus, View};
 
@@ -43,10 +43,6 @@ pub struct Front<R, P> {
     pub(super) recording: R,
     pub(super) panel: P,
     pub(super) serial: &'static str,
-    /// The reading that the screen shows, its speeds corrected by the clock's trim.
-    pub(super) reading: Option<Reading>,
-    pub(super) readings: u32,
-    pub(super) first_us: Option<u64>,
     pub(super) view: View,
     /// The words of a fault that has not been acknowledged.
     words: Option<String<TEXT_BYTES>>,
@@ -72,9 +68,6 @@ impl<R: Recording, P: Panel> Front<R, P> {
             recording,
             panel,
             serial,
-            reading: None,
-            readings: 0,
-            first_us: None,
             view: View::default(),
             words: None,
             told: Wanted::default(),
@@ -119,7 +112,7 @@ impl<R: Recording, P: Panel> Front<R, P> {
             Traffic { events: acquired.account.received, lost },
         );
         while let Ok(reading) = self.shared.readings.try_receive() {
-            self.take_in(reading);
+            self.instrument.observe(&reading);
         }
         if let Ok(picture) = self.shared.taken.try_receive() {
             self.instrument.show_picture(picture);
@@ -131,22 +124,6 @@ impl<R: Recording, P: Panel> Front<R, P> {
             self.told = wanted;
             self.shared.wanted.signal(wanted);
         }
-    }
-
-    fn take_in(&mut self, mut reading: Reading) {
-        self.instrument.observe(&reading);
-        self.first_us.get_or_insert(reading.t_us.saturating_sub(u64::from(reading.window_us / 2)));
-        if self.instrument.mode() == Mode::Hold {
-            return;
-        }
-        let trim = 1.0 + self.instrument.preferences().clock_trim_ppm * 1e-6;
-        for speed in reading.rotors.iter_mut().filter_map(|rotor| rotor.speed.as_mut()) {
-            speed.omega_rad_s *= trim;
-            speed.omega_sigma_rad_s *= trim;
-            speed.alpha_rad_s2 = speed.alpha_rad_s2.map(|alpha| alpha * trim * trim);
-        }
-        self.reading = Some(reading);
-        self.readings = self.readings.wrapping_add(1);
     }
 
     /// The fault that is shown, in its own words.

@@ -56,10 +56,9 @@ fn words(view: &View) -> Vec<(&'static str, Action, bool), MOST_KEYS> {
             &[back, hold, main("ROTOR", Action::NextRotor), main("UNIT", Action::NextUnit)]
         }
         (Page::Main, State::Refused(Reason::Ambiguous)) => &[
-            hold,
             main("BLADES ÷2", Action::BladesHalf),
             main("BLADES ×2", Action::BladesTwice),
-            main("FIND", Action::Blades(None)),
+            ("FIND", Action::Blades(None), view.preferences.blades.is_none()),
             main("SETUP", Action::Page(Page::Settings)),
         ],
         (Page::Main, _) => &[
@@ -113,7 +112,7 @@ pub fn action_at(view: &View, at: Point) -> Option<Action> {
         }
         Page::Aim => None,
         Page::Main if scene::THUMBNAIL.contains(at) => Some(Action::Page(Page::Aim)),
-        Page::Main => list::rotor_at(view, at).map(Action::Rotor),
+        Page::Main => list::rotor_at(view, at).map(|id| Action::Rotor(Some(id))),
     }
 }
 

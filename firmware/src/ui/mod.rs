@@ -35,7 +35,7 @@ impl Screen {
         Self { shown: None }
     }
 
-    /// Draws what has changed since the last time.
+    /// Draws what has changed since the last time. Not inlined, so that there is one of it in the device.
     ///
     /// # Errors
     ///

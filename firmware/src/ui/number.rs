@@ -4,6 +4,7 @@ use core::fmt::Write as _;
 
 use embedded_graphics::pixelcolor::Rgb565;
 use embedded_graphics::prelude::*;
+use evtach_core::Direction;
 use heapless::String;
 
 use super::text::{self, Align, HUGE, Ink, MEDIUM, SMALL, width};
@@ -16,7 +17,7 @@ const BASELINE: i32 = 107;
 const DETAILS_BASELINE: i32 = 134;
 /// Where the unit begins.
 const UNIT: i32 = 406;
-const DASHES: &str = "–––––";
+const DASHES: &str = "-----";
 
 pub fn changed(a: &View, b: &View) -> bool {
     let of = |v: &View| {
@@ -75,30 +76,13 @@ pub fn draw_details<D: DrawTarget<Color = Rgb565>>(
     target.fill_solid(&area(0, 114, 480, 28), BACK)?;
     let left = Point::new(8, DETAILS_BASELINE);
     let ink = Ink { colour: DIM, paper: BACK };
-    if !view.state.has_speed() {
-        let mut words = String::<96>::new();
-        if let State::Fault(fault) = view.state {
-            write!(words, "{}; ", fault.name()).ok();
-        }
-        words.push_str(view.state.advice()).ok();
-        return text::draw(
-            target,
-            &SMALL,
-            &words,
-            left,
-            Align::Left,
-            Ink { colour: TEXT, paper: BACK },
-        );
+    let advice = view.state.advice();
+    if !advice.is_empty() {
+        let ink = Ink { colour: TEXT, paper: BACK };
+        text::draw(target, &SMALL, advice, left, Align::Left, ink)?;
+    } else if let Some(direction) = view.direction {
+        draw_turning(target, left, direction, view)?;
     }
-    let mut words = String::<48>::new();
-    if let Some(direction) = view.direction {
-        words.push_str(in_words(direction)).ok();
-    }
-    if let Some(blades) = view.blades {
-        let (plural, set) = (if blades == 1 { "" } else { "s" }, view.preferences.blades.is_some());
-        write!(words, "  ·  {blades} blade{plural}{}", if set { " set" } else { "" }).ok();
-    }
-    text::draw(target, &SMALL, &words, left, Align::Left, ink)?;
     if let Some(speed) = view.speed {
         let mut error = String::<16>::new();
         write!(error, "± {}", speed.error).ok();
@@ -108,9 +92,28 @@ pub fn draw_details<D: DrawTarget<Color = Rgb565>>(
     Ok(())
 }
 
-const fn in_words(direction: evtach_core::Direction) -> &'static str {
+/// Direction and blades.
+fn draw_turning<D: DrawTarget<Color = Rgb565>>(
+    target: &mut D,
+    left: Point,
+    direction: Direction,
+    view: &View,
+) -> Result<(), D::Error> {
+    theme::draw_sense(target, left + Point::new(6, -6), 6, direction, DIM)?;
+    let mut words = String::<48>::new();
+    words.push_str(in_words(direction)).ok();
+    if let Some(blades) = view.blades {
+        let plural = if blades == 1 { "" } else { "s" };
+        let set = if view.preferences.blades.is_some() { " set" } else { "" };
+        write!(words, "  ·  {blades} blade{plural}{set}").ok();
+    }
+    let at = left + Point::new(20, 0);
+    text::draw(target, &SMALL, &words, at, Align::Left, Ink { colour: DIM, paper: BACK })
+}
+
+const fn in_words(direction: Direction) -> &'static str {
     match direction {
-        evtach_core::Direction::Cw => "clockwise",
-        evtach_core::Direction::Ccw => "counter-clockwise",
+        Direction::Cw => "clockwise",
+        Direction::Ccw => "counter-clockwise",
     }
 }

@@ -44,8 +44,11 @@ fn draw<D: DrawTarget<Color = Rgb565>>(
     view: &View,
 ) -> Result<(), D::Error> {
     let shown = fit(room, picture);
-    if shown.size != room.size {
+    if shown.size != room.size || picture.columns() == 0 {
         target.fill_solid(&room, PANEL)?;
+    }
+    if picture.columns() == 0 {
+        return Ok(());
     }
     let Size { width, height } = shown.size;
     let (wide, high) = (width as usize, height as usize);
@@ -58,9 +61,6 @@ fn draw<D: DrawTarget<Color = Rgb565>>(
     // Nothing of a rotor beyond the picture's edge.
     let mut inside = target.clipped(&shown);
     let sensor_px = columns as f32 * f32::from(picture.cell_px());
-    if sensor_px <= 0.0 {
-        return Ok(());
-    }
     let scale = width as f32 / sensor_px;
     for row in &view.rotors {
         let at = |px: f32| (px * scale) as i32;

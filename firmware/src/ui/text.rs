@@ -16,7 +16,7 @@ pub static SMALL: Font = mplus!(1, 500, 15, true, 1, 2, ' '..='~', ["±", "×", 
 pub static MEDIUM: Font = mplus!(1, 600, 22, true, 1, 2, ' '..='~', ["±", "×", "÷", "·", "–"]);
 
 /// The number: digits of 73 px, all equally wide.
-pub static HUGE: Font = mplus!(1, 600, 100, true, 1, 2, '0'..='9', [".", "–"]);
+pub static HUGE: Font = mplus!(1, 600, 100, true, 1, 2, '0'..='9', [".", "-"]);
 
 /// Where a text stands relative to its point, which is on the baseline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,8 +3,9 @@
 use embedded_graphics::pixelcolor::Rgb565;
 use embedded_graphics::prelude::*;
 use embedded_graphics::primitives::{
-    CornerRadii, PrimitiveStyle, Rectangle, RoundedRectangle, StyledDrawable as _,
+    Circle, CornerRadii, PrimitiveStyle, Rectangle, RoundedRectangle, StyledDrawable as _, Triangle,
 };
+use evtach_core::Direction;
 
 use crate::instrument::State;
 
@@ -97,4 +98,24 @@ pub fn fill_round<D: DrawTarget<Color = Rgb565>>(
 ) -> Result<(), D::Error> {
     let round = RoundedRectangle::new(area, CornerRadii::new(Size::new_equal(5)));
     round.draw_styled(&PrimitiveStyle::with_fill(colour), target)
+}
+
+/// A circle with an arrow: down on its right side is clockwise.
+///
+/// # Errors
+///
+/// Whatever the target reports.
+pub fn draw_sense<D: DrawTarget<Color = Rgb565>>(
+    target: &mut D,
+    centre: Point,
+    radius: i32,
+    direction: Direction,
+    colour: Rgb565,
+) -> Result<(), D::Error> {
+    let circle = Circle::with_center(centre, 2 * radius as u32);
+    circle.draw_styled(&PrimitiveStyle::with_stroke(colour, 1), target)?;
+    let down = if direction == Direction::Cw { 1 } else { -1 };
+    let corner = |x: i32, y: i32| centre + Point::new(radius + x, y * down);
+    Triangle::new(corner(-4, -1), corner(3, -1), corner(0, 3))
+        .draw_styled(&PrimitiveStyle::with_fill(colour), target)
 }
