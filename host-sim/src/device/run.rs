@@ -24,7 +24,7 @@ pub enum Pace {
 }
 
 const RECORDING: &str = "recording.ev8";
-const STREAM: &str = "stream.spi";
+pub(super) const STREAM: &str = "stream.spi";
 
 /// Bytes of the serial flash that QEMU has.
 const FLASH_BYTES: usize = 16 << 20;
@@ -67,23 +67,52 @@ pub fn run_spi(image: &Image, stream: &[u8], pace: Pace) -> Result<Output, Devic
     start(image, folder.path(), "spi", pace)
 }
 
+/// Lets the firmware read a stream as [`run_spi`] does and draw its screen after every reading; returns also the pixels
+/// that are there at the end: 480x272, row by row, RGB565 in two bytes, little-endian.
+///
+/// # Errors
+///
+/// As [`run_spi`].
+pub fn run_screen(image: &Image, stream: &[u8]) -> Result<(Output, Vec<u8>), DeviceError> {
+    let folder = scratch()?;
+    let file = |path| move |source| DeviceError::File { path, source };
+    let path = folder.path().join(STREAM);
+    fs::write(&path, stream).map_err(file(path))?;
+    let output = start_with(image, folder.path(), &["spi", "screen"], Pace::File)?;
+    let path = folder.path().join("screen.rgb565");
+    let pixels = fs::read(&path).map_err(file(path))?;
+    Ok((output, pixels))
+}
+
 /// A folder that goes away.
-fn scratch() -> Result<TempDir, DeviceError> {
+pub(super) fn scratch() -> Result<TempDir, DeviceError> {
     tempfile::tempdir().map_err(|source| DeviceError::File { path: std::env::temp_dir(), source })
 }
 
 /// Runs QEMU in a folder: the program knows files by their name there, so that no path can be too long.
 fn start(image: &Image, folder: &Path, input: &str, pace: Pace) -> Result<Output, DeviceError> {
+    match pace {
+        Pace::File => start_with(image, folder, &[input], pace),
+        Pace::Sensor => start_with(image, folder, &[input, "sensor"], pace),
+    }
+}
+
+fn start_with(
+    image: &Image,
+    folder: &Path,
+    words: &[&str],
+    pace: Pace,
+) -> Result<Output, DeviceError> {
     let script = fs::canonicalize(root().join("firmware/src/board/mps2_an500/qemu.sh"))
         .map_err(|source| DeviceError::File { path: root(), source })?;
     let mut command = Command::new(&script);
-    command.arg(&image.path).arg(input).current_dir(folder);
+    command.arg(&image.path).args(words).current_dir(folder);
     if folder.join(STREAM).exists() {
         command.env("EVTACH_FLASH", STREAM);
     }
     match pace {
         Pace::File => command.env("EVTACH_ICOUNT_SHIFT", "0"),
-        Pace::Sensor => command.arg("sensor").env("EVTACH_ICOUNT_SHIFT", "2"),
+        Pace::Sensor => command.env("EVTACH_ICOUNT_SHIFT", "2"),
     };
     let output = command
         .output()

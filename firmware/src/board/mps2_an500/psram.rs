@@ -17,7 +17,7 @@ use evtach_firmware::settings::MemoryFlash;
 use evtach_firmware::tasks;
 
 /// Where it lies, and what is in it.
-const START: usize = 0x2100_0000;
+const START: usize = 0x6000_0000;
 const PREFERENCES: usize = START + 0x4_0000;
 const KEPT: usize = START + 0x5_0000;
 const COOKIE: usize = START + 0x6_0000;

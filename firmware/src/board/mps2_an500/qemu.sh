@@ -18,14 +18,16 @@ for argument in "$@"; do
 done
 options=()
 if [ -n "${EVTACH_FLASH:-}" ]; then
-  # The chip is as large as it is: what follows the file reads as zeros.
+  # The chip is as large as it is: what follows the file reads as zeros. The copy has no name left once QEMU runs.
   chip=$(mktemp)
-  trap 'rm -f "$chip"' EXIT
   cp -- "$EVTACH_FLASH" "$chip"
   truncate -s 16M "$chip"
-  options+=(-drive "if=none,id=flash,format=raw,file=$chip" -device n25q128a11,drive=flash)
+  exec 3<>"$chip"
+  rm -- "$chip"
+  options+=(-drive if=none,id=flash,format=raw,file=/dev/fd/3 -device n25q128a11,drive=flash)
 fi
 sleep=off
 [ -z "${EVTACH_SERIAL:-}" ] || sleep=on
-qemu-system-arm -machine mps2-an500 -icount "shift=${EVTACH_ICOUNT_SHIFT:-0},sleep=$sleep" \
-  -display none -monitor none -serial "${EVTACH_SERIAL:-none}" "${options[@]}" -semihosting-config "$config" -kernel "$image"
+exec qemu-system-arm -machine mps2-an500 -icount "shift=${EVTACH_ICOUNT_SHIFT:-0},sleep=$sleep" \
+  -display none -monitor none -serial "${EVTACH_SERIAL:-none}" "${options[@]}" \
+  -semihosting-config "$config" -kernel "$image"

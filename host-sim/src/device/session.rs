@@ -1,0 +1,148 @@
+//! The firmware as an instrument in QEMU, spoken to over its serial port.
+
+use std::fs;
+use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
+use std::net::{TcpListener, TcpStream};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+
+use super::image::root;
+use super::run::{STREAM, scratch};
+use super::{DeviceError, Image};
+
+/// How long QEMU may take to open the port.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// How long an answer may take: `MEASure?` waits for 1.5 s of the board's time, which may be slower than ours.
+const ANSWER: Duration = Duration::from_secs(6);
+
+/// A running instrument; it is switched off when this goes away.
+#[derive(Debug)]
+pub struct Session {
+    qemu: Child,
+    port: BufReader<TcpStream>,
+    address: String,
+    // Holds what QEMU reads.
+    _folder: TempDir,
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        self.qemu.kill().ok();
+        self.qemu.wait().ok();
+    }
+}
+
+impl Session {
+    /// Switches it on at 250 million instructions a second, with this stream in the flash behind its SPI controller, and
+    /// these words behind "instrument" on its command line.
+    ///
+    /// # Errors
+    ///
+    /// When QEMU is missing, or the port cannot be opened.
+    pub fn start(
+        image: &Image,
+        stream: Option<&[u8]>,
+        words: &[&str],
+    ) -> Result<Self, DeviceError> {
+        let folder = scratch()?;
+        let script = root().join("firmware/src/board/mps2_an500/qemu.sh");
+        let failed =
+            |source| DeviceError::Start { program: script.display().to_string(), source };
+        let mut command = Command::new(fs::canonicalize(&script).map_err(failed)?);
+        command.arg(&image.path).arg("instrument").args(words);
+        if let Some(stream) = stream {
+            let path = folder.path().join(STREAM);
+            fs::write(&path, stream)
+                .map_err(|source| DeviceError::File { path: path.clone(), source })?;
+            command.env("EVTACH_FLASH", path);
+        }
+        let free = TcpListener::bind("127.0.0.1:0").and_then(|free| free.local_addr());
+        let address = free.map_err(failed)?.to_string();
+        command
+            .env("EVTACH_ICOUNT_SHIFT", "2")
+            .env("EVTACH_SERIAL", format!("tcp:{address},server=on,wait=on"))
+            .stdout(Stdio::null())
+            .stderr(Stdio::null());
+        let mut qemu = command.spawn().map_err(failed)?;
+        match connect(&address) {
+            Ok(port) => Ok(Self { qemu, port: BufReader::new(port), address, _folder: folder }),
+            Err(source) => {
+                qemu.kill().ok();
+                qemu.wait().ok();
+                Err(failed(source))
+            }
+        }
+    }
+
+    /// Hangs up, so that another program may take the port at the address that is returned.
+    ///
+    /// # Errors
+    ///
+    /// When the port cannot be closed.
+    pub fn hang_up(&mut self) -> io::Result<&str> {
+        self.port.get_ref().shutdown(std::net::Shutdown::Both)?;
+        Ok(&self.address)
+    }
+
+    /// Sends a line.
+    ///
+    /// # Errors
+    ///
+    /// When the port fails.
+    pub fn write(&mut self, line: &str) -> io::Result<()> {
+        self.port.get_mut().write_all(format!("{line}\n").as_bytes())
+    }
+
+    /// Sends a line and reads the line that answers it.
+    ///
+    /// # Errors
+    ///
+    /// When the port fails, or no answer comes in 6 seconds.
+    pub fn query(&mut self, line: &str) -> io::Result<String> {
+        self.write(line)?;
+        let mut answer = String::new();
+        self.port.read_line(&mut answer)?;
+        Ok(answer.trim_end().to_owned())
+    }
+
+    /// Sends a line and reads the definite length block that answers it.
+    ///
+    /// # Errors
+    ///
+    /// When the port fails, or no block comes.
+    pub fn query_block(&mut self, line: &str) -> io::Result<Vec<u8>> {
+        self.write(line)?;
+        let mut head = [0; 2];
+        self.port.read_exact(&mut head)?;
+        let digits = head[1].saturating_sub(b'0');
+        if head[0] != b'#' || !(1..=9).contains(&digits) {
+            return Err(io::Error::new(io::ErrorKind::InvalidData, "no block"));
+        }
+        let mut length = vec![0; usize::from(digits)];
+        self.port.read_exact(&mut length)?;
+        let length = String::from_utf8_lossy(&length).parse().map_err(io::Error::other)?;
+        let mut block = vec![0; length];
+        self.port.read_exact(&mut block)?;
+        self.port.read_exact(&mut [0])?;
+        Ok(block)
+    }
+}
+
+/// Connects as soon as QEMU listens.
+fn connect(address: &str) -> io::Result<TcpStream> {
+    let start = Instant::now();
+    loop {
+        match TcpStream::connect(address) {
+            Ok(port) => {
+                port.set_nodelay(true)?;
+                port.set_read_timeout(Some(ANSWER))?;
+                return Ok(port);
+            }
+            Err(error) if start.elapsed() > PATIENCE => return Err(error),
+            Err(_) => std::thread::sleep(Duration::from_millis(20)),
+        }
+    }
+}
