@@ -7,9 +7,7 @@ use std::time::{Duration, Instant};
 
 use embedded_graphics::pixelcolor::IntoStorage as _;
 use evtach_core::{Event, Geometry, Poll, Settings};
-use evtach_firmware::instrument::{
-    Fault, Instrument, Picture, Preferences, Sensor, Traffic,
-};
+use evtach_firmware::instrument::{Fault, Instrument, Picture, Preferences, Sensor, Traffic};
 use evtach_firmware::intake::BLOCK_EVENTS;
 use evtach_firmware::sensor::spi::{Bridge, Kind, Parser, Words};
 use evtach_firmware::ui::Screen;
@@ -113,13 +111,16 @@ fn screens_equal_the_pcs_pixel_for_pixel() {
     }
 }
 
-/// Asks until the answer is as wanted; panics with the last one after 30 s. A question that a restart swallowed is
+/// Asks until the answer is as wanted; panics with the last one after 60 s. A question that a restart swallowed is
 /// asked again.
 fn wait_for(session: &mut Session, query: &str, wanted: impl Fn(&str) -> bool) -> String {
     let start = Instant::now();
     let mut last = String::new();
-    while start.elapsed() < Duration::from_secs(30) {
-        last = session.query(query).unwrap_or_default();
+    while start.elapsed() < Duration::from_secs(60) {
+        last = session.query(query).unwrap_or_else(|error| {
+            session.clear().expect("a port");
+            error.to_string()
+        });
         if wanted(&last) {
             return last;
         }
@@ -143,7 +144,9 @@ fn fault(words: &[&str], fault: Fault) -> Option<(Session, String)> {
     }
     let image = device::build().expect("the firmware builds");
     let mut session = Session::start(&image, None, words).expect("the firmware runs");
-    let said = wait_for(&mut session, "SYST:FAULT?", |answer| answer.contains('"') && !answer.contains("none"));
+    let said = wait_for(&mut session, "SYST:FAULT?", |answer| {
+        answer.contains('"') && !answer.contains("none")
+    });
     assert_eq!(session.query("FETC:REAS?").expect("an answer"), "\"fault\"");
     assert!(session.query("FETC?").expect("an answer").starts_with("9.91"));
     // The screen is drawn four times a second.

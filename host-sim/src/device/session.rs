@@ -16,7 +16,10 @@ use super::{DeviceError, Image};
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// How long an answer may take: `MEASure?` waits for 1.5 s of the board's time, which may be slower than ours.
-const ANSWER: Duration = Duration::from_secs(6);
+const ANSWER: Duration = Duration::from_secs(10);
+
+/// How long nothing comes when nothing more will.
+const QUIET: Duration = Duration::from_millis(500);
 
 /// A running instrument; it is switched off when this goes away.
 #[derive(Debug)]
@@ -49,8 +52,7 @@ impl Session {
     ) -> Result<Self, DeviceError> {
         let folder = scratch()?;
         let script = root().join("firmware/src/board/mps2_an500/qemu.sh");
-        let failed =
-            |source| DeviceError::Start { program: script.display().to_string(), source };
+        let failed = |source| DeviceError::Start { program: script.display().to_string(), source };
         let mut command = Command::new(fs::canonicalize(&script).map_err(failed)?);
         command.arg(&image.path).arg("instrument").args(words);
         if let Some(stream) = stream {
@@ -100,12 +102,24 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// When the port fails, or no answer comes in 6 seconds.
+    /// When the port fails, or no answer comes in 10 seconds.
     pub fn query(&mut self, line: &str) -> io::Result<String> {
         self.write(line)?;
         let mut answer = String::new();
         self.port.read_line(&mut answer)?;
         Ok(answer.trim_end().to_owned())
+    }
+
+    /// Forgets a question that was not answered in time: clears the device, and passes over what still comes.
+    ///
+    /// # Errors
+    ///
+    /// When the port fails.
+    pub fn clear(&mut self) -> io::Result<()> {
+        self.port.get_mut().write_all(b"\x03\n")?;
+        self.port.get_ref().set_read_timeout(Some(QUIET))?;
+        while self.port.read(&mut [0; 4096]).is_ok_and(|count| count > 0) {}
+        self.port.get_ref().set_read_timeout(Some(ANSWER))
     }
 
     /// Sends a line and reads the definite length block that answers it.

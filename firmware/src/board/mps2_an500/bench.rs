@@ -88,8 +88,8 @@ impl Film {
 
     /// Writes the pixels to a file of the host, two bytes each, little-endian.
     fn save(&self) {
-        let written =
-            fs::File::create(c"screen.rgb565").and_then(|mut file| file.write_all(self.panel.bytes()));
+        let written = fs::File::create(c"screen.rgb565")
+            .and_then(|mut file| file.write_all(self.panel.bytes()));
         if let Err(error) = written {
             fail(error);
         }

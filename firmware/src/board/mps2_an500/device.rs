@@ -26,7 +26,8 @@ static FRONT: InterruptExecutor = InterruptExecutor::new();
 /// Longest path on the command line, in bytes.
 const PATH_BYTES: usize = 256;
 
-const USAGE: &str = "usage: FILE [sensor|screen], or: spi [sensor|screen], or: instrument [FAULT] [SECONDS]";
+const USAGE: &str =
+    "usage: FILE [sensor|screen], or: spi [sensor|screen], or: instrument [FAULT] [SECONDS]";
 
 /// What the command line asks for.
 enum Asked {

@@ -1,12 +1,13 @@
 //! Faults on purpose, asked for on the command line, so that tests see how the device takes them.
 
+use cortex_m::peripheral::SCB;
+use embassy_futures::block_on;
 use embassy_time::{Duration, Timer};
 use embedded_storage_async::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
-use evtach_firmware::settings::MemoryFlashError;
+use evtach_firmware::instrument::Preferences;
+use evtach_firmware::settings::{MemoryFlashError, Store};
 
-use cortex_m::peripheral::SCB;
-
-use crate::psram;
+use crate::psram::{self, PREFERENCES_BYTES};
 
 /// How long the device runs before the fault.
 const AFTER: Duration = Duration::from_millis(1_500);
@@ -47,7 +48,8 @@ impl Injection {
         match self {
             Self::Panic(victim) if victim == task => panic!("asked for in the task {task}"),
             Self::Hang(victim) if victim == task => loop {
-                core::hint::spin_loop();
+                // No `spin_loop`: QEMU spends ages on the YIELD that it is.
+                cortex_m::asm::nop();
             },
             _ => core::future::pending().await,
         }
@@ -64,10 +66,17 @@ impl PowerSupply {
         flash.restore_power();
         match injection {
             Injection::Preferences => {
-                *flash = psram::Preferences::new([0x5a; psram::PREFERENCES_BYTES]);
+                *flash = psram::Preferences::new([0x5a; PREFERENCES_BYTES]);
             }
-            // The second word of the next write is cut in its midst.
-            Injection::PowerCut => flash.cut_power(1, 100),
+            // Something is there to be lost, and the second word of what follows it is cut in its midst.
+            Injection::PowerCut => {
+                block_on(
+                    Store::new(&mut *flash, 0, PREFERENCES_BYTES as u32)
+                        .save(&Preferences::default()),
+                )
+                .ok();
+                flash.cut_power(1, 100);
+            }
             Injection::None | Injection::Panic(_) | Injection::Hang(_) => {}
         }
         Self(flash)

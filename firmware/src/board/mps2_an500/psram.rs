@@ -78,7 +78,13 @@ pub fn take() -> Option<Psram> {
             cookie.write_volatile(WRITTEN);
         }
         let (recording, scratch) = (RecordingMemory(()), Scratch(()));
-        Some(Psram { panel: Panel(&mut *frame), preferences: &mut *preferences, recording, scratch, warm })
+        Some(Psram {
+            panel: Panel(&mut *frame),
+            preferences: &mut *preferences,
+            recording,
+            scratch,
+            warm,
+        })
     }
 }
 

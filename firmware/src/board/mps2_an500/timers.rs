@@ -73,14 +73,7 @@ unsafe impl InterruptNumber for Irq {
 impl Irq {
     /// The interrupt of this number, when it is one of these.
     pub fn from_number(number: i16) -> Option<Self> {
-        [
-            Self::Receive,
-            Self::Alarm,
-            Self::Counter,
-            Self::Front,
-            Self::Measure,
-            Self::Acquire,
-        ]
+        [Self::Receive, Self::Alarm, Self::Counter, Self::Front, Self::Measure, Self::Acquire]
             .into_iter()
             .find(|irq| *irq as i16 == number)
     }
