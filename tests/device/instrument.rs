@@ -6,6 +6,8 @@ mod compare;
 use std::time::{Duration, Instant};
 
 use embedded_graphics::pixelcolor::IntoStorage as _;
+use evtach_core::limits::DEVICE_HEAT_CELLS;
+use evtach_core::rotors::HeatMap;
 use evtach_core::{Event, Geometry, Poll, Settings};
 use evtach_firmware::instrument::{Fault, Instrument, Picture, Preferences, Sensor, Traffic};
 use evtach_firmware::intake::BLOCK_EVENTS;
@@ -132,6 +134,10 @@ fn wait_for(session: &mut Session, query: &str, wanted: impl Fn(&str) -> bool) -
 fn fault_screen(fault: Fault) -> Vec<u8> {
     let mut instrument = Instrument::new(Preferences::default());
     instrument.fail(fault);
+    // The picture of a sensor that has sent nothing, which the measurement hands out before the first event.
+    let (mut counts, mut picture) = ([0; DEVICE_HEAT_CELLS], Picture::EMPTY);
+    picture.take(&HeatMap::new(&mut counts, Geometry { width_px: 320, height_px: 320 }));
+    instrument.show_picture(&picture);
     let mut frame = Frame::default();
     let Ok(()) = Screen::new().draw(&mut frame, &instrument);
     bytes(&frame)
@@ -153,7 +159,7 @@ fn fault(words: &[&str], fault: Fault) -> Option<(Session, String)> {
     let drawn = fault_screen(fault);
     let start = Instant::now();
     while session.query_block("HCOP:SDUM:DATA?").expect("the screen") != drawn {
-        assert!(start.elapsed() < Duration::from_secs(30), "{words:?}: another screen");
+        assert!(start.elapsed() < Duration::from_secs(60), "{words:?}: another screen");
     }
     Some((session, said))
 }

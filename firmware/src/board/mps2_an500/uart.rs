@@ -64,8 +64,11 @@ impl ErrorType for Uart {
 impl Read for Uart {
     async fn read(&mut self, bytes: &mut [u8]) -> Result<usize, Infallible> {
         let count = RECEIVED.read(bytes).await;
-        CONTROL.write(SEND | RECEIVE | RECEIVE_INTERRUPT);
-        on_receive();
+        // What waited for room comes in now; the interrupt must not read the same byte.
+        critical_section::with(|_| {
+            CONTROL.write(SEND | RECEIVE | RECEIVE_INTERRUPT);
+            on_receive();
+        });
         Ok(count)
     }
 }
