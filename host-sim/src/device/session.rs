@@ -12,6 +12,9 @@ use super::image::root;
 use super::run::{STREAM, scratch};
 use super::{DeviceError, Image};
 
+/// Instructions in one tick of the board's 25 MHz timers, at QEMU's `-icount shift=2`.
+const INSTRUCTIONS_PER_SLOW_TICK: u64 = 10;
+
 /// How long QEMU may take to open the port.
 const PATIENCE: Duration = Duration::from_secs(10);
 
@@ -50,6 +53,15 @@ impl Session {
         stream: Option<&[u8]>,
         words: &[&str],
     ) -> Result<Self, DeviceError> {
+        Self::start_with(image, stream, words, Stdio::null())
+    }
+
+    fn start_with(
+        image: &Image,
+        stream: Option<&[u8]>,
+        words: &[&str],
+        stdout: Stdio,
+    ) -> Result<Self, DeviceError> {
         let folder = scratch()?;
         let script = root().join("firmware/src/board/mps2_an500/qemu.sh");
         let failed = |source| DeviceError::Start { program: script.display().to_string(), source };
@@ -66,7 +78,7 @@ impl Session {
         command
             .env("EVTACH_ICOUNT_SHIFT", "2")
             .env("EVTACH_SERIAL", format!("tcp:{address},server=on,wait=on"))
-            .stdout(Stdio::null())
+            .stdout(stdout)
             .stderr(Stdio::null());
         let mut qemu = command.spawn().map_err(failed)?;
         match connect(&address) {
@@ -143,6 +155,64 @@ impl Session {
         self.port.read_exact(&mut [0])?;
         Ok(block)
     }
+}
+
+/// Who used the processor while the instrument ran.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Used {
+    /// Seconds of the board's time.
+    pub seconds: u32,
+    /// Instructions by task; "sleep" are those that were not carried out.
+    pub instructions: Vec<(String, u64)>,
+    /// Readings told over the link.
+    pub readings: u32,
+    /// Deepest stack while the program started, in bytes.
+    pub stack_starting: u64,
+    /// Deepest stack since, in bytes.
+    pub stack_running: u64,
+}
+
+/// Runs the instrument for some seconds of the board's time, with a stream in its flash and its link telling every
+/// reading, and says who used the processor.
+///
+/// # Errors
+///
+/// When QEMU is missing, or the firmware says something else.
+pub fn run_instrument(image: &Image, stream: &[u8], seconds: u32) -> Result<Used, DeviceError> {
+    let words = [seconds.to_string()];
+    let mut session =
+        Session::start_with(image, Some(stream), &[&words[0]], Stdio::piped())?;
+    let failed = |source| DeviceError::Start { program: "qemu-system-arm".to_owned(), source };
+    // It ends by itself.
+    session.port.get_ref().set_read_timeout(None).map_err(failed)?;
+    session.write("SYST:LOG ON").map_err(failed)?;
+    let mut told = String::new();
+    // The port closes when the program ends.
+    session.port.read_to_string(&mut told).map_err(failed)?;
+    let mut said = String::new();
+    if let Some(stdout) = &mut session.qemu.stdout {
+        stdout.read_to_string(&mut said).map_err(failed)?;
+    }
+    let mut used = Used { seconds, ..Used::default() };
+    used.readings = told.lines().filter(|line| line.starts_with('{')).count() as u32;
+    for (index, line) in said.lines().enumerate() {
+        let number = |key: &str| {
+            let word = line.split(' ').find_map(|word| word.strip_prefix(key)?.strip_prefix('='));
+            word.and_then(|word| word.parse::<u64>().ok())
+        };
+        let foreign = || DeviceError::Line { line: index + 1, text: line.to_owned() };
+        if let Some((_, name)) = line.strip_prefix("used ").and_then(|rest| rest.split_once("name=")) {
+            let ticks = number("ticks").ok_or_else(foreign)?;
+            used.instructions.push((name.to_owned(), ticks * INSTRUCTIONS_PER_SLOW_TICK));
+        } else if line.starts_with("ran ") {
+            used.stack_starting = number("stack_starting").ok_or_else(foreign)?;
+            used.stack_running = number("stack_running").ok_or_else(foreign)?;
+        }
+    }
+    if used.instructions.is_empty() || used.stack_running == 0 {
+        return Err(DeviceError::Line { line: said.lines().count() + 1, text: String::new() });
+    }
+    Ok(used)
 }
 
 /// Connects as soon as QEMU listens.
