@@ -2,8 +2,6 @@
 
 use core::sync::atomic::Ordering;
 
-use embassy_futures::yield_now;
-use embassy_time::{Duration, Instant, Timer};
 use evtach_core::{Reading, Settings, Tachometer};
 
 use super::shared::{Shared, Task, Wanted};
@@ -11,26 +9,16 @@ use crate::cost::Spent;
 use crate::intake::Block;
 use crate::measure::Companion;
 
-/// Busy for so long, measuring rests.
-const BUSY: Duration = Duration::from_micros(1_800);
-
-/// The rest, in which those below run, is so much of the time before: a tenth in all.
-const SHARE: u32 = 9;
-
-/// Longest time that is rested from: waiting for events was a rest already.
-const LONGEST: Duration = Duration::from_micros(4_500);
-
 /// Hands readings and pictures on, and takes what is to be looked at.
 pub struct Measuring<R> {
     shared: &'static Shared,
     record: R,
-    rested: Instant,
 }
 
 impl<R: FnMut(&Block)> Measuring<R> {
     /// `record` gets every block, for the recorder.
     pub const fn new(shared: &'static Shared, record: R) -> Self {
-        Self { shared, record, rested: Instant::MIN }
+        Self { shared, record }
     }
 }
 
@@ -55,14 +43,5 @@ impl<R: FnMut(&Block)> Companion for Measuring<R> {
             picture.take(tachometer.heat());
             self.shared.taken.try_send(picture).ok();
         }
-    }
-
-    async fn rest(&mut self) {
-        let busy = Instant::now().saturating_duration_since(self.rested);
-        if busy < BUSY {
-            return yield_now().await;
-        }
-        Timer::after(busy.min(LONGEST) / SHARE).await;
-        self.rested = Instant::now();
     }
 }

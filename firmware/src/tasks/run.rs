@@ -25,7 +25,7 @@ const LINK: Duration = Duration::from_millis(50);
 const SAVE: Duration = Duration::from_millis(500);
 
 /// Longest time that a task may be silent. Measuring says that it is alive after every step, the others twice a second.
-const HUNG: Duration = Duration::from_secs(2);
+const HUNG: Duration = Duration::from_secs(3);
 
 /// Draws four times a second what the instrument shows, and feeds the watchdog while every task is alive; with one that is
 /// not, `hung` is told which.

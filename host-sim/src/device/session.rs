@@ -180,15 +180,15 @@ pub struct Used {
 /// When QEMU is missing, or the firmware says something else.
 pub fn run_instrument(image: &Image, stream: &[u8], seconds: u32) -> Result<Used, DeviceError> {
     let words = [seconds.to_string()];
-    let mut session =
-        Session::start_with(image, Some(stream), &[&words[0]], Stdio::piped())?;
+    let mut session = Session::start_with(image, Some(stream), &[&words[0]], Stdio::piped())?;
     let failed = |source| DeviceError::Start { program: "qemu-system-arm".to_owned(), source };
     // It ends by itself.
     session.port.get_ref().set_read_timeout(None).map_err(failed)?;
     session.write("SYST:LOG ON").map_err(failed)?;
-    let mut told = String::new();
-    // The port closes when the program ends.
-    session.port.read_to_string(&mut told).map_err(failed)?;
+    let mut told = Vec::new();
+    // The port closes, or breaks, when the program ends: what came before is what was told.
+    session.port.read_to_end(&mut told).ok();
+    let told = String::from_utf8_lossy(&told);
     let mut said = String::new();
     if let Some(stdout) = &mut session.qemu.stdout {
         stdout.read_to_string(&mut said).map_err(failed)?;
@@ -201,7 +201,9 @@ pub fn run_instrument(image: &Image, stream: &[u8], seconds: u32) -> Result<Used
             word.and_then(|word| word.parse::<u64>().ok())
         };
         let foreign = || DeviceError::Line { line: index + 1, text: line.to_owned() };
-        if let Some((_, name)) = line.strip_prefix("used ").and_then(|rest| rest.split_once("name=")) {
+        if let Some((_, name)) =
+            line.strip_prefix("used ").and_then(|rest| rest.split_once("name="))
+        {
             let ticks = number("ticks").ok_or_else(foreign)?;
             used.instructions.push((name.to_owned(), ticks * INSTRUCTIONS_PER_SLOW_TICK));
         } else if line.starts_with("ran ") {

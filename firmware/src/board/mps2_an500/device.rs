@@ -1,5 +1,5 @@
 //! Start-up, command line and interrupts. Tasks run on executors at interrupts' levels, each above the next: acquiring,
-//! measuring, the front. The thread sleeps: QEMU lets time pass for WFI, but spins through the WFE of embassy's
+//! the front, measuring. The thread sleeps: QEMU lets time pass for WFI, but spins through the WFE of embassy's
 //! thread executor.
 #![expect(unsafe_code, reason = "the vector table's link to its handlers")]
 
@@ -53,8 +53,8 @@ fn main() -> ! {
     let nvic = &mut peripherals.NVIC;
     timers::start(nvic);
     Irq::Acquire.set_priority(nvic, 0x80);
+    Irq::Front.set_priority(nvic, 0xA0);
     Irq::Measure.set_priority(nvic, 0xC0);
-    Irq::Front.set_priority(nvic, 0xE0);
     let started = match command_line() {
         Asked::File(file, how) => start_bench(Some(file), how),
         Asked::Flash(how) => start_bench(None, how),

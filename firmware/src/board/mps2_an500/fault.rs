@@ -60,7 +60,7 @@ fn panic(info: &PanicInfo<'_>) -> ! {
 /// The watchdog has not been fed.
 #[exception]
 unsafe fn NonMaskableInt() {
-    stop(Fault::Watchdog, "the screen was not drawn for a second");
+    stop(Fault::Watchdog, "the screen was not drawn for four seconds");
 }
 
 #[exception]

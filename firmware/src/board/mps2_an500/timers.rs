@@ -78,7 +78,7 @@ impl Irq {
             .find(|irq| *irq as i16 == number)
     }
 
-    /// Lower is more urgent: time, then acquiring, measuring, screen and link.
+    /// Lower is more urgent: time, then acquiring, screen and link, measuring.
     pub fn set_priority(self, nvic: &mut NVIC, priority: u8) {
         // SAFETY: no critical section here rests on a priority; they all mask every interrupt.
         unsafe { nvic.set_priority(self, priority) }

@@ -1,5 +1,5 @@
-//! The board's watchdog (Arm "Cortex-M System Design Kit" TRM, chapter 4): not fed for a second it asks for the
-//! non-maskable interrupt, and for two it resets the board.
+//! The board's watchdog (Arm "Cortex-M System Design Kit" TRM, chapter 4): not fed for four seconds it asks for the
+//! non-maskable interrupt, and for eight it resets the board.
 
 use crate::register::Register;
 
@@ -12,8 +12,8 @@ const LOCK: Register = Register(BASE + 0xc00);
 const UNLOCK: u32 = 0x1acc_e551;
 const INTERRUPT_AND_RESET: u32 = 0b11;
 
-/// A second of the board's 25 MHz.
-const PERIOD_TICKS: u32 = 25_000_000;
+/// Four seconds of the board's 25 MHz: beside more events than the processor can take, a whole screen takes two to draw.
+const PERIOD_TICKS: u32 = 100_000_000;
 
 /// Starts it. From now on it wants to be fed.
 pub fn start() {
