@@ -1,6 +1,7 @@
 //! The instrument in QEMU: what a person sees on its screen and reads over its serial port, also when it fails.
 
 #[path = "compare.rs"]
+#[expect(dead_code, reason = "shared with other tests")]
 mod compare;
 
 use std::time::{Duration, Instant};
@@ -127,7 +128,8 @@ fn wait_for(session: &mut Session, query: &str, wanted: impl Fn(&str) -> bool) -
             return last;
         }
     }
-    panic!("{query} is still answered {last}");
+    assert!(wanted(&last), "{query} is still answered {last}");
+    last
 }
 
 /// The screen that shows a fault with no sensor, as the PC draws it.
