@@ -223,6 +223,25 @@ impl<'m> Tachometer<'m> {
         }
     }
 
+    /// Begins anew with other settings: another sensor, or a blade count that the person chose. What was counted
+    /// stays counted.
+    pub fn configure(&mut self, settings: Settings) {
+        self.settings = settings;
+        self.heat.resize(settings.geometry);
+        self.tracker = Tracker::default();
+        self.started = false;
+        self.window_segments = 0;
+        self.job = Job::Idle;
+        self.candidates.clear();
+        self.outcomes.clear();
+    }
+
+    /// The settings in use.
+    #[must_use]
+    pub const fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
     /// Takes in events in time order; never waits for a measurement.
     /// Cost: about 50 instructions an event, and one pass over the heat map for each segment that ends.
     pub fn push(&mut self, events: &[Event]) {

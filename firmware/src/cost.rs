@@ -69,7 +69,8 @@ impl<C: Clock> Costs<C> {
         Self { clock, stages: LinearMap::new(), pushed: 0, push: none, spent }
     }
 
-    /// Pushes events.
+    /// Pushes events. Not inlined, so that there is one of it however many tasks measure.
+    #[inline(never)]
     pub fn push(&mut self, tachometer: &mut Tachometer<'_>, events: &[Event]) {
         let start = self.clock.ticks();
         tachometer.push(events);
@@ -79,7 +80,8 @@ impl<C: Clock> Costs<C> {
         self.spent.push += ticks;
     }
 
-    /// Polls once.
+    /// Polls once. Not inlined, for the same reason.
+    #[inline(never)]
     pub fn poll(&mut self, tachometer: &mut Tachometer<'_>, steps: u32) -> Poll {
         let stage = tachometer.stage();
         let start = self.clock.ticks();

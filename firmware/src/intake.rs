@@ -5,6 +5,7 @@ use core::mem;
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_sync::zerocopy_channel::Sender;
 use embassy_time::{Duration, Instant, Timer};
+use evtach_core::Geometry;
 use heapless::Vec;
 
 use crate::record::{Decoder, Header, HeaderError, RECORD_BYTES, Record};
@@ -21,6 +22,10 @@ pub const BLOCKS: usize = 32;
 pub struct Block {
     /// Records in the order in which they came.
     pub records: Vec<Record, BLOCK_EVENTS>,
+    /// Time of the first in microseconds: a record alone tells only its low 32 bits.
+    pub t_us: u64,
+    /// Size of the sensor that they come from.
+    pub geometry: Geometry,
     /// Events lost before these, because every block was taken.
     pub lost: u64,
     /// Whether this is the last block.
@@ -29,7 +34,14 @@ pub struct Block {
 
 impl Block {
     /// A block without events.
-    pub const EMPTY: Self = Self { records: Vec::new(), lost: 0, last: false };
+    pub const EMPTY: Self = Self {
+        records: Vec::new(),
+        t_us: 0,
+        // All zeros, so that the blocks need no image in flash.
+        geometry: Geometry { width_px: 0, height_px: 0 },
+        lost: 0,
+        last: false,
+    };
 }
 
 /// How fast a recording plays.
@@ -40,6 +52,31 @@ pub enum Pace {
     File,
     /// As fast as it was recorded: a sensor does not wait, and what finds no free block is lost.
     Sensor,
+    /// As fast as it was recorded, and for a sensor for good: its end is a sensor that went away, and what follows
+    /// one that came back. For bring-up with no camera.
+    Replay,
+    /// No recording: as fast as it comes from a sensor.
+    Live,
+}
+
+impl Pace {
+    /// Whether what comes can wait for whoever measures.
+    #[must_use]
+    pub const fn can_wait(self) -> bool {
+        matches!(self, Self::File)
+    }
+
+    /// Whether time passes as it did when it was recorded.
+    #[must_use]
+    pub const fn is_timed(self) -> bool {
+        matches!(self, Self::Sensor | Self::Replay)
+    }
+
+    /// Whether there is no end.
+    #[must_use]
+    pub const fn is_endless(self) -> bool {
+        matches!(self, Self::Replay | Self::Live)
+    }
 }
 
 /// A stream of bytes: a file, or a link to a sensor.
@@ -112,16 +149,17 @@ pub async fn take_in<S: Source, M: RawMutex>(
         if read < bytes.len() {
             return Err(IntakeError::Truncated { events: taken, expected: header.events });
         }
-        if let (Pace::Sensor, Some(record)) = (pace, records.last()) {
-            let age_us = decoder.decode(*record).t_us.saturating_sub(header.first_us);
+        let first_us = records.first().map_or(0, |record| decoder.decode(*record).t_us);
+        let last_us = records.last().map_or(0, |record| decoder.decode(*record).t_us);
+        if pace.is_timed() {
+            let age_us = last_us.saturating_sub(header.first_us);
             Timer::at(start + Duration::from_micros(age_us)).await;
         }
-        let slot = match pace {
-            Pace::File => Some(blocks.send().await),
-            Pace::Sensor => blocks.try_send(),
-        };
+        let slot = if pace.can_wait() { Some(blocks.send().await) } else { blocks.try_send() };
         if let Some(slot) = slot {
             mem::swap(&mut slot.records, &mut records);
+            slot.t_us = first_us;
+            slot.geometry = header.geometry;
             slot.lost = mem::take(&mut lost);
             slot.last = false;
             blocks.send_done();

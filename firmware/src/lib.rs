@@ -5,9 +5,19 @@
 //! peripherals and interrupts, and nothing else.
 #![no_std]
 
+#[cfg(test)]
+extern crate std;
+
 pub mod cost;
 pub mod instrument;
 pub mod intake;
+pub mod kept;
 pub mod measure;
 pub mod record;
+pub mod recorder;
 pub mod report;
+pub mod scpi;
+pub mod sensor;
+pub mod settings;
+pub mod tasks;
+pub mod ui;

@@ -3,12 +3,13 @@
 use embassy_futures::yield_now;
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_sync::zerocopy_channel::Receiver;
-use evtach_core::{Event, Poll, Reading, Tachometer};
+use embassy_time::{Duration, with_timeout};
+use evtach_core::{Event, Poll, Reading, Settings, Tachometer};
 use heapless::Vec;
 
 use crate::cost::{Clock, Costs, Spent};
 use crate::intake::{BLOCK_EVENTS, Block, Pace};
-use crate::record::{Decoder, Header};
+use crate::record::Decoder;
 
 /// Steps of a measurement between two looks at what has arrived.
 pub const STEPS: u32 = 1;
@@ -16,57 +17,82 @@ pub const STEPS: u32 = 1;
 /// Where blocks are turned into events and pushed.
 struct Intake<'t, 'm, C> {
     tachometer: &'t mut Tachometer<'m>,
-    decoder: Decoder,
     costs: &'t mut Costs<C>,
     ended: bool,
 }
 
 impl<C: Clock> Intake<'_, '_, C> {
     fn push(&mut self, block: &Block) {
+        let settings = *self.tachometer.settings();
+        if settings.geometry != block.geometry && !block.records.is_empty() {
+            self.tachometer.configure(Settings { geometry: block.geometry, ..settings });
+        }
         if block.lost > 0 {
             self.tachometer.lost(block.lost);
         }
+        let mut decoder = Decoder::new(block.t_us);
         let events: Vec<Event, BLOCK_EVENTS> =
-            block.records.iter().map(|&record| self.decoder.decode(record)).collect();
+            block.records.iter().map(|&record| decoder.decode(record)).collect();
         self.costs.push(self.tachometer, &events);
         self.ended |= block.last;
     }
 }
 
-/// Measures until the last block, and hands every reading to `show` with what it cost.
+/// What goes on around a measurement: on a board the rest of the device, in a test a list of readings.
+pub trait Companion {
+    /// A block has come.
+    fn arrived(&mut self, _block: &Block) {}
+
+    /// A window has been measured, at this cost.
+    fn measured(&mut self, reading: &Reading, spent: Spent);
+
+    /// Between two steps, and twice a second when nothing comes.
+    fn between(&mut self, _tachometer: &mut Tachometer<'_>) {}
+
+    /// After a step: lets others run.
+    fn rest(&mut self) -> impl Future<Output = ()> {
+        yield_now()
+    }
+}
+
+/// Longest time between two calls of [`Companion::between`] while no events come.
+const IDLE: Duration = Duration::from_millis(500);
+
+/// Measures until the last block.
 pub async fn measure<M: RawMutex>(
     tachometer: &mut Tachometer<'_>,
-    header: &Header,
     blocks: &mut Receiver<'_, M, Block>,
     pace: Pace,
     costs: &mut Costs<impl Clock>,
-    mut show: impl FnMut(&Reading, Spent),
+    companion: &mut impl Companion,
 ) {
-    let decoder = Decoder::new(header.first_us);
-    let mut intake = Intake { tachometer, decoder, costs, ended: false };
+    let mut intake = Intake { tachometer, costs, ended: false };
     let mut finished = false;
     while !finished {
         if intake.ended {
             intake.tachometer.finish();
             finished = true;
-        } else {
-            intake.push(blocks.receive().await);
+        } else if let Ok(block) = with_timeout(IDLE, blocks.receive()).await {
+            companion.arrived(block);
+            intake.push(block);
             blocks.receive_done();
         }
         loop {
+            companion.between(intake.tachometer);
             match intake.costs.poll(intake.tachometer, STEPS) {
                 Poll::Idle => break,
                 Poll::Pending => {}
-                Poll::Ready(reading) => show(&reading, intake.costs.take_spent()),
+                Poll::Ready(reading) => companion.measured(&reading, intake.costs.take_spent()),
             }
             // A sensor goes on while a window is measured; a file waits, and is measured to the end.
-            while pace == Pace::Sensor
+            while !pace.can_wait()
                 && let Some(block) = blocks.try_receive()
             {
+                companion.arrived(block);
                 intake.push(block);
                 blocks.receive_done();
             }
-            yield_now().await;
+            companion.rest().await;
         }
     }
 }

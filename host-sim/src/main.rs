@@ -28,6 +28,10 @@ enum Command {
     Bench(cmd::bench::Args),
     /// A report with pictures.
     Plot(cmd::plot::Args),
+    /// The device's screen as a picture.
+    Screen(cmd::screen::Args),
+    /// A live view in the terminal, of a recording or of a device.
+    Watch(cmd::watch::Args),
 }
 
 fn main() -> ExitCode {
@@ -38,6 +42,8 @@ fn main() -> ExitCode {
         Command::Synth(args) => cmd::synth::run(&args),
         Command::Bench(args) => cmd::bench::run(args),
         Command::Plot(args) => cmd::plot::run(args),
+        Command::Screen(args) => cmd::screen::run(&args),
+        Command::Watch(args) => cmd::watch::run(args),
     };
     result.unwrap_or_else(|error| {
         eprintln!("evtach: {error:#}");

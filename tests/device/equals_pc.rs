@@ -1,5 +1,8 @@
 //! The device and the PC give the same readings for the same events, to the last bit.
 
+#[path = "compare.rs"]
+mod compare;
+
 use std::env;
 use std::path::{Path, PathBuf};
 
@@ -11,29 +14,14 @@ use evtach_host::recording::{self, OpenOptions};
 use evtach_host::synth::scene::Lamp;
 use evtach_host::synth::{self, Rotor, Scene};
 
-/// Compares the two line by line and returns the readings; `None` without QEMU.
+/// Plays events to the device and compares; `None` without QEMU.
 fn compare(name: &str, geometry: Geometry, events: &[Event]) -> Option<Vec<Reading>> {
-    if !device::qemu_present() {
-        assert!(env::var_os("CI").is_none(), "no qemu-system-arm: ./ci.sh install installs it");
-        println!("skipped: qemu-system-arm is not installed; ./ci.sh install installs it");
+    if !compare::qemu_present() {
         return None;
     }
     let image = device::build().expect("the firmware builds");
     let output = device::run(&image, geometry, events, Pace::File).expect("the firmware runs");
-    // The same capacities, but another rhythm: pieces of another size, each measured in one go.
-    let (readings, _) = measure_events(events, &[], Settings::new(geometry), Capacity::Device);
-    assert!(!readings.is_empty(), "{name}: {} events and no reading", events.len());
-    for (index, (here, there)) in readings.iter().zip(&output.readings).enumerate() {
-        let here = Lines(here).to_string();
-        for (here, there) in here.lines().zip(there.lines.lines()) {
-            assert_eq!(here, there, "{name}: reading {index}: PC on the left, device on the right");
-        }
-        assert_eq!(here.lines().count(), there.lines.lines().count(), "{name}: reading {index}");
-    }
-    assert_eq!(readings.len(), output.readings.len(), "{name}: number of readings");
-    let lines: usize = readings.iter().map(|reading| 1 + reading.rotors.len()).sum();
-    println!("{name}: {} readings, {lines} lines equal", readings.len());
-    Some(readings)
+    Some(compare::assert_equal(name, geometry, events, &output))
 }
 
 /// A scene in front of a DAVIS346.

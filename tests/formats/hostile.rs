@@ -202,9 +202,11 @@ fn cut_files_give_what_is_there() {
             assert!(found.error.is_none(), "{name}: {:?}", found.error);
             let count = found.events.len();
             assert!(count > 10_000 && found.events == events[..count], "{name}: {count} events");
-            // Without its last byte, AEDAT4 lacks a part of its table and text its last newline: no event.
-            if keep == whole.len() - 1 && !matches!(format, WriteFormat::Aedat4 | WriteFormat::Csv)
-            {
+            // Without its last byte, AEDAT4 lacks a part of its table, text its last newline and SPI the mark of
+            // its end: no event.
+            let ends_in_event =
+                !matches!(format, WriteFormat::Aedat4 | WriteFormat::Csv | WriteFormat::Spi);
+            if keep == whole.len() - 1 && ends_in_event {
                 assert_eq!(
                     (count, found.recording.side().notes.len()),
                     (events.len() - 1, 1),
@@ -236,6 +238,27 @@ fn damage_in_the_midst_is_told_with_its_place_behind_the_good_events() {
 }
 
 #[test]
+fn damaged_frames_of_an_spi_stream_are_left_out_and_their_events_counted() {
+    let events = some_events(30_000);
+    let mut bytes = bytes_of(WriteFormat::Spi, &events);
+    for at in (10_000..bytes.len() - 1000).step_by(20_000) {
+        bytes[at..at + 3].fill(0x55);
+    }
+    let found = read_bytes("a.spi", &bytes, None).expect("a stream");
+    assert!(found.error.is_none(), "{:?}", found.error);
+    let lost = events.len() - found.events.len();
+    assert!(lost > 500 && found.recording.lost() == lost as u64, "{lost}");
+    let notes = &found.recording.side().notes;
+    assert!(notes.len() == 1 && notes[0].contains(&format!("{lost} in ")), "{notes:?}");
+
+    // Its first frame tells the sensor; so does each a tenth of a second later.
+    bytes[10] ^= 1;
+    let found = read_bytes("a.spi", &bytes, None).expect("a stream");
+    assert_eq!(found.recording.geometry, SIZE);
+    assert!(refusal("a.spi", &bytes[..2000]).contains("no frame tells the sensor"));
+}
+
+#[test]
 fn what_is_no_recording_is_refused_with_advice() {
     assert!(refusal("a.raw", b"").contains("empty"));
     refusal("a.txt", b"Dear reader,\nthis is a letter.\n");
@@ -247,9 +270,38 @@ fn what_is_no_recording_is_refused_with_advice() {
     assert!(refusal("a.bag", b"#ROSBAG V2.0\n....").contains("rosbags-convert"));
     assert!(refusal("a.db3", b"SQLite format 3\0....").contains("DB3"));
     assert!(refusal("a.es", b"Event Stream\x01\x00\x00\x01").contains("ES"));
+    assert!(refusal("a.ev8", b"evtach8\n\x00\x00").contains("EV8, byte 8"));
+    assert!(refusal("a.ev8", &[b"evtach8\n".as_slice(), &[0; 16]].concat()).contains("byte 16"));
     assert!(refusal("a.npy", b"\x93NUMPY\x01\x00\xff\xff{").contains("NPY"));
     assert!(refusal("a.aedat4", b"#!AER-DAT4.0\r\n\xff\xff\xff\x7f").contains("byte 14"));
     assert!(refusal("a.gz", b"\x1f\x8b\x08\x00 not gzip").contains("compressed"));
+}
+
+#[test]
+fn the_devices_recording_is_read_as_far_as_its_header_counts() {
+    let events = some_events(100);
+    let mut bytes = bytes_of(WriteFormat::Ev8, &events);
+    bytes.extend_from_slice(b"what a terminal left behind");
+    let found = read_bytes("a.ev8", &bytes, None).expect("EV8");
+    assert_eq!(found.events, events);
+    assert!(found.recording.side().notes[0].contains(&format!("byte {}", 24 + 100 * 8)));
+    // A header that promises four thousand million events.
+    bytes[20..24].fill(0xff);
+    let found = read_bytes("a.ev8", &bytes, None).expect("EV8");
+    assert!(found.events.starts_with(&events) && found.events.len() < 104);
+    assert!(found.recording.side().notes[0].contains("before its header says so"));
+}
+
+#[test]
+fn what_the_devices_recording_cannot_hold_is_refused() {
+    let scratch = Scratch::new();
+    let far = event(1 << 31, 0, 0, true);
+    for wrong in [[event(0, 0, 0, true), far], [far, event(0, 0, 1 << 15, true)]] {
+        let mut writer =
+            write::create(&scratch.file("a.ev8"), WriteFormat::Ev8, SIZE).expect("a file");
+        let error = writer.write(&wrong).expect_err("does not fit").to_string();
+        assert!(error.contains("help: "), "{error}");
+    }
 }
 
 #[test]

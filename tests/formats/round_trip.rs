@@ -83,7 +83,14 @@ fn long_recordings_cross_every_packet_and_chunk_border() {
 fn time_that_steps_back_is_kept_where_the_format_can_hold_it() {
     let at = |t_us| event(t_us, 1, 2, true);
     let events = [at(50), at(40), at(60)];
-    for format in [WriteFormat::Dat, WriteFormat::Aedat4, WriteFormat::Csv, WriteFormat::Npy] {
+    for format in [
+        WriteFormat::Dat,
+        WriteFormat::Aedat4,
+        WriteFormat::Csv,
+        WriteFormat::Npy,
+        WriteFormat::Spi,
+        WriteFormat::Ev8,
+    ] {
         assert_eq!(through(format, &events).0, events, "{}", format.as_str());
     }
     for format in [WriteFormat::Evt2, WriteFormat::Evt3, WriteFormat::Es] {

@@ -170,6 +170,12 @@ impl<'m> HeatMap<'m> {
         }
     }
 
+    /// Forgets everything, and covers a sensor of this size from now on.
+    pub fn resize(&mut self, geometry: Geometry) {
+        self.grid = CellGrid::fit(geometry, CELL_LOG2, self.counts.len());
+        self.clear();
+    }
+
     /// Forgets everything.
     pub fn clear(&mut self) {
         self.counts.fill(0);

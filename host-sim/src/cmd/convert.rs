@@ -16,7 +16,7 @@ pub struct Args {
     input: PathBuf,
     /// Recording to write, its format by the extension (.raw is EVT3, .evt2.raw is EVT2); "-" writes to stdout.
     output: PathBuf,
-    /// Format to write, whatever the extension: evt2, evt3, dat, aedat4, csv, npy, es.
+    /// Format to write, whatever the extension: evt2, evt3, dat, aedat4, csv, npy, es, spi, ev8.
     #[arg(long, value_name = "FORMAT")]
     to: Option<WriteFormat>,
     /// Size of the sensor, where the recording does not say it or says it wrong.

@@ -5,4 +5,6 @@ pub mod convert;
 pub mod info;
 pub mod measure;
 pub mod plot;
+pub mod screen;
 pub mod synth;
+pub mod watch;

@@ -3,12 +3,14 @@
 mod image;
 mod output;
 mod run;
+mod session;
 
 use std::path::PathBuf;
 
 pub use image::{Image, build};
-pub use output::{CallCost, DeviceReading, MemoryUse, Output};
-pub use run::{Pace, qemu_present, run, write_recording};
+pub use output::{Acquired, CallCost, DeviceReading, MemoryUse, Output};
+pub use run::{Pace, qemu_present, run, run_screen, run_spi, write_recording};
+pub use session::{Session, Used, run_instrument};
 
 /// Instructions in one tick of the board's 25 MHz timers, at QEMU's `-icount shift=0`.
 pub const INSTRUCTIONS_PER_TICK: u64 = 40;
@@ -49,6 +51,11 @@ pub enum DeviceError {
         "{0} events are more than a recording for the device can hold: cut it with --start and --end"
     )]
     TooManyEvents(usize),
+    /// A stream that the emulated flash does not hold.
+    #[error(
+        "{0} bytes are more than the emulated flash holds (16 MiB): cut the recording with --start and --end"
+    )]
+    TooLongStream(usize),
     /// The firmware stopped on its own.
     #[error("the firmware ended with code {code}: {message}")]
     Failed {

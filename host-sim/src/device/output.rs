@@ -49,6 +49,27 @@ pub struct MemoryUse {
     pub stack_bytes: u64,
 }
 
+/// What acquisition over SPI counted; the names are those of `evtach_firmware::sensor::spi`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Acquired {
+    /// Events that the sensor sent.
+    pub sent: u64,
+    /// Events that came.
+    pub received: u64,
+    /// Events left out evenly before measuring.
+    pub thinned: u64,
+    /// Events that found no free block.
+    pub overrun: u64,
+    /// Events lost by the bridge.
+    pub bridge: u64,
+    /// Events lost in damaged frames.
+    pub damaged: u64,
+    /// Events lost in missing frames.
+    pub missing: u64,
+    /// Events lost in words that hold none.
+    pub undecoded: u64,
+}
+
 /// Everything that one run says.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Output {
@@ -64,6 +85,8 @@ pub struct Output {
     pub overrun: u64,
     /// Memory in use.
     pub memory: MemoryUse,
+    /// What came over SPI, when that is where events came from.
+    pub acquired: Option<Acquired>,
 }
 
 fn field<'l>(line: &'l str, key: &str) -> Option<&'l str> {
@@ -93,6 +116,19 @@ fn memory(line: &str) -> Option<MemoryUse> {
     })
 }
 
+fn acquired(line: &str) -> Option<Acquired> {
+    Some(Acquired {
+        sent: number(line, "sent")?,
+        received: number(line, "received")?,
+        thinned: number(line, "thinned")?,
+        overrun: number(line, "overrun")?,
+        bridge: number(line, "bridge")?,
+        damaged: number(line, "damaged")?,
+        missing: number(line, "missing")?,
+        undecoded: number(line, "undecoded")?,
+    })
+}
+
 #[derive(Default)]
 struct Reader {
     readings: Vec<DeviceReading>,
@@ -101,6 +137,7 @@ struct Reader {
     stages: Vec<CallCost>,
     overrun: Option<u64>,
     memory: Option<MemoryUse>,
+    acquired: Option<Acquired>,
 }
 
 impl Reader {
@@ -117,6 +154,7 @@ impl Reader {
             "stage" => self.stages.push(call_cost(line, line.split_once(" name=")?.1)?),
             "overrun" => self.overrun = Some(number(line, "events")?),
             "memory" => self.memory = Some(memory(line)?),
+            "acquired" => self.acquired = Some(acquired(line)?),
             _ => return None,
         }
         Some(())
@@ -144,12 +182,13 @@ impl Output {
             stages,
             overrun: Some(overrun),
             memory: Some(memory),
+            acquired,
             ..
         } = reader
         else {
             return Err(DeviceError::Line { line: lines + 1, text: String::new() });
         };
-        Ok(Self { readings, events, push, stages, overrun, memory })
+        Ok(Self { readings, events, push, stages, overrun, memory, acquired })
     }
 }
 

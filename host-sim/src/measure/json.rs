@@ -1,7 +1,9 @@
 //! The JSON document of `evtach measure --json`: a contract, its version counted by `schema`.
 
+use std::borrow::Cow;
+
 use evtach_core::{Reading, RotorReading, Status};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::summary::Summary;
 
@@ -37,7 +39,7 @@ pub struct Document {
 }
 
 /// One rotor of a reading.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RotorRow {
     /// Letter.
     pub id: String,
@@ -52,30 +54,30 @@ pub struct RotorRow {
     /// +/- 1.96 of it covers 95 %.
     pub rpm_sigma: Option<f64>,
     /// "cw" or "ccw" as seen on the screen.
-    pub direction: Option<&'static str>,
+    pub direction: Option<Cow<'static, str>>,
     /// Equal blades, where known.
     pub blades: Option<u8>,
     /// Change of the magnitude.
     pub accel_rpm_per_s: Option<f64>,
     /// "camera" or "room".
-    pub frame: Option<&'static str>,
+    pub frame: Option<Cow<'static, str>>,
     /// "locked", "coarse" or "refused".
-    pub status: &'static str,
+    pub status: Cow<'static, str>,
     /// Why it was refused.
-    pub reason: Option<&'static str>,
+    pub reason: Option<Cow<'static, str>>,
 }
 
 /// One reading of the series.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ReadingRow {
     /// Middle of the window from the first event.
     pub t_s: f64,
     /// Length of the window.
     pub window_s: f64,
     /// "locked", "coarse" or "refused".
-    pub status: &'static str,
+    pub status: Cow<'static, str>,
     /// Why it was refused.
-    pub reason: Option<&'static str>,
+    pub reason: Option<Cow<'static, str>>,
     /// Its rotors.
     pub rotors: Vec<RotorRow>,
 }
@@ -122,12 +124,12 @@ impl RotorRow {
             radius_px: widen(rotor.radius_px),
             rpm: speed.map(|s| widen(s.rpm())),
             rpm_sigma: speed.map(|s| widen(s.rpm_sigma())),
-            direction: speed.map(|s| s.direction().as_str()),
+            direction: speed.map(|s| s.direction().as_str().into()),
             blades: rotor.blades,
             accel_rpm_per_s: speed.and_then(|s| s.accel_rpm_per_s()).map(widen),
-            frame: speed.map(|s| s.frame.as_str()),
-            status: rotor.status.as_str(),
-            reason: reason(rotor.status),
+            frame: speed.map(|s| s.frame.as_str().into()),
+            status: rotor.status.as_str().into(),
+            reason: reason(rotor.status).map(Cow::from),
         }
     }
 }
@@ -139,8 +141,8 @@ impl ReadingRow {
         Self {
             t_s: reading.t_us.saturating_sub(first_us) as f64 * 1e-6,
             window_s: f64::from(reading.window_us) * 1e-6,
-            status: reading.status.as_str(),
-            reason: reason(reading.status),
+            status: reading.status.as_str().into(),
+            reason: reason(reading.status).map(Cow::from),
             rotors: reading.rotors.iter().map(RotorRow::new).collect(),
         }
     }

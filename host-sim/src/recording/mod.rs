@@ -8,6 +8,7 @@ mod csv;
 mod dat;
 mod error;
 mod es;
+mod ev8;
 mod geometry;
 mod imu;
 mod input;
@@ -16,6 +17,7 @@ mod open;
 mod prophesee_header;
 mod raw;
 mod ros2;
+mod spi;
 pub mod write;
 
 use evtach_core::{Event, Geometry};

@@ -13,8 +13,8 @@ use super::error::RecordingError;
 use super::input::Input;
 use super::prophesee_header::Header;
 use super::{
-    OpenOptions, Opened, Recording, Side, aedat2, aedat3, aedat4, csv, dat, es, geometry, npy, raw,
-    ros2,
+    OpenOptions, Opened, Recording, Side, aedat2, aedat3, aedat4, csv, dat, es, ev8, geometry, npy,
+    raw, ros2, spi,
 };
 
 /// Bytes looked at to tell text from binary.
@@ -166,6 +166,12 @@ fn sniff(
     }
     if head.starts_with(es::MAGIC) {
         return es::open(input);
+    }
+    if head.starts_with(spi::MAGIC) {
+        return spi::open(input);
+    }
+    if head.starts_with(ev8::MAGIC) {
+        return ev8::open(input);
     }
     if head.starts_with(npy::MAGIC) {
         return npy::open(input);

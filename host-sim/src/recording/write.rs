@@ -11,8 +11,10 @@ use super::csv::CsvWriter;
 use super::dat::DatWriter;
 use super::error::RecordingError;
 use super::es::EsWriter;
+use super::ev8::Ev8Writer;
 use super::npy::NpyWriter;
 use super::raw::{Evt2Writer, Evt3Writer};
+use super::spi::SpiWriter;
 
 /// A format that can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -31,12 +33,25 @@ pub enum WriteFormat {
     Npy,
     /// Event Stream 2, type DVS.
     Es,
+    /// What the device reads over SPI.
+    Spi,
+    /// The device's own.
+    Ev8,
 }
 
 impl WriteFormat {
     /// Every format, in the order of the documentation.
-    pub const ALL: [Self; 7] =
-        [Self::Evt2, Self::Evt3, Self::Dat, Self::Aedat4, Self::Csv, Self::Npy, Self::Es];
+    pub const ALL: [Self; 9] = [
+        Self::Evt2,
+        Self::Evt3,
+        Self::Dat,
+        Self::Aedat4,
+        Self::Csv,
+        Self::Npy,
+        Self::Es,
+        Self::Spi,
+        Self::Ev8,
+    ];
 
     /// The name used on the command line.
     #[must_use]
@@ -49,6 +64,8 @@ impl WriteFormat {
             Self::Csv => "csv",
             Self::Npy => "npy",
             Self::Es => "es",
+            Self::Spi => "spi",
+            Self::Ev8 => "ev8",
         }
     }
 
@@ -60,7 +77,9 @@ impl WriteFormat {
             Self::Evt3 => ((1 << 38) - 1, true),
             Self::Dat => ((1 << 32) - 1, false),
             Self::Es => (3_600_000_000, true),
-            Self::Aedat4 | Self::Csv | Self::Npy => (i64::MAX as u64, false),
+            Self::Aedat4 | Self::Csv | Self::Npy | Self::Spi | Self::Ev8 => {
+                (i64::MAX as u64, false)
+            }
         }
     }
 
@@ -77,6 +96,8 @@ impl WriteFormat {
             ("csv" | "txt", _) => Some(Self::Csv),
             ("npy", _) => Some(Self::Npy),
             ("es", _) => Some(Self::Es),
+            ("spi", _) => Some(Self::Spi),
+            ("ev8", _) => Some(Self::Ev8),
             _ => None,
         }
     }
@@ -140,6 +161,8 @@ pub fn create(
         WriteFormat::Csv => Box::new(CsvWriter::new(target)?),
         WriteFormat::Npy => Box::new(NpyWriter::new(target)?),
         WriteFormat::Es => Box::new(EsWriter::new(target, geometry)?),
+        WriteFormat::Spi => Box::new(SpiWriter::new(target, geometry)),
+        WriteFormat::Ev8 => Box::new(Ev8Writer::new(target, geometry)?),
     };
     Ok(Writer { sink })
 }

@@ -1,204 +1,168 @@
-//! Two tasks, each at an interrupt's level: intake above, measuring below in what time is left. The
-//! thread sleeps: QEMU lets time pass for WFI, but spins through the WFE of embassy's thread executor.
+//! Start-up, command line and interrupts. Tasks run on executors at interrupts' levels, each above the next: acquiring,
+//! the front, measuring. The thread sleeps: QEMU lets time pass for WFI, but spins through the WFE of embassy's
+//! thread executor.
 #![expect(unsafe_code, reason = "the vector table's link to its handlers")]
 
-use core::arch::asm;
 use core::ffi::CStr;
-use core::fmt::{Display, Write as _};
 
-use cortex_m_rt::{ExceptionFrame, entry, exception};
+use cortex_m::peripheral::NVIC;
+use cortex_m_rt::{entry, exception};
 use embassy_executor::InterruptExecutor;
-use embassy_futures::block_on;
-use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::zerocopy_channel::{Channel, Receiver, Sender};
-use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
-use evtach_core::{Geometry, Memory, Reading, Settings, StoredEvent, Tachometer};
-use evtach_firmware::cost::{Costs, Spent};
-use evtach_firmware::intake::{self, BLOCKS, Block, Pace};
-use evtach_firmware::measure::measure;
-use evtach_firmware::record::Header;
-use evtach_firmware::report::Lines;
+use evtach_firmware::intake::Pace;
 use semihosting::experimental::env;
-use semihosting::{fs, process};
-use static_cell::{ConstStaticCell, StaticCell};
+use semihosting::fs;
 
-use crate::console::{Console, File};
-use crate::stack;
-use crate::timers::{self, Irq, Ticks};
+use crate::console::File;
+use crate::fault::fail;
+use crate::injection::Injection;
+use crate::timers::{self, Irq};
+use crate::usage::{User, charge};
+use crate::{bench, memory, program, psram, stack, uart};
 
-type Mutex = CriticalSectionRawMutex;
-
-static BUFFERS: ConstStaticCell<[Block; BLOCKS]> =
-    ConstStaticCell::new([const { Block::EMPTY }; BLOCKS]);
-static CHANNEL: StaticCell<Channel<'_, Mutex, Block>> = StaticCell::new();
-static STORE: StaticCell<[StoredEvent; DEVICE_EVENTS]> = StaticCell::new();
-static HEAT: ConstStaticCell<[u16; DEVICE_HEAT_CELLS]> =
-    ConstStaticCell::new([0; DEVICE_HEAT_CELLS]);
-static WEIGHTS: ConstStaticCell<[u8; DEVICE_HEAT_CELLS]> =
-    ConstStaticCell::new([0; DEVICE_HEAT_CELLS]);
-static TACHOMETER: StaticCell<Tachometer<'_>> = StaticCell::new();
-static INTAKE: InterruptExecutor = InterruptExecutor::new();
+static ACQUIRE: InterruptExecutor = InterruptExecutor::new();
 static MEASURE: InterruptExecutor = InterruptExecutor::new();
-
-/// Bytes of the heat map and its weights.
-const HEAT_BYTES: usize =
-    size_of::<[u16; DEVICE_HEAT_CELLS]>() + size_of::<[u8; DEVICE_HEAT_CELLS]>();
-
-// What the core may take of the 320 KB: the rest is for screen, links and stack.
-const _: () = {
-    assert!(size_of::<Tachometer<'_>>() + HEAT_BYTES <= 96 * 1024);
-    assert!(size_of::<[StoredEvent; DEVICE_EVENTS]>() <= 128 * 1024);
-};
+static FRONT: InterruptExecutor = InterruptExecutor::new();
 
 /// Longest path on the command line, in bytes.
 const PATH_BYTES: usize = 256;
+
+const USAGE: &str =
+    "usage: FILE [sensor|screen], or: spi [sensor|screen], or: instrument [FAULT] [SECONDS]";
+
+/// What the command line asks for.
+enum Asked {
+    /// A file of the host is measured.
+    File(File, How),
+    /// So is what lies in the flash behind the SPI controller.
+    Flash(How),
+    /// The instrument runs, to print who used the processor after so many seconds, or for good.
+    Instrument(Injection, Option<u32>),
+}
+
+/// How a recording is measured.
+struct How {
+    pace: Pace,
+    screen: bool,
+}
 
 #[entry]
 fn main() -> ! {
     let Some(mut peripherals) = cortex_m::Peripherals::take() else {
         fail("the peripherals are taken");
     };
-    timers::start(&mut peripherals.NVIC);
-    let (mut file, pace) = command_line();
-    let header = match block_on(intake::open(&mut file)) {
-        Ok(header) => header,
-        Err(error) => fail(error),
+    let nvic = &mut peripherals.NVIC;
+    timers::start(nvic);
+    Irq::Acquire.set_priority(nvic, 0x80);
+    Irq::Front.set_priority(nvic, 0xA0);
+    Irq::Measure.set_priority(nvic, 0xC0);
+    let started = match command_line() {
+        Asked::File(file, how) => start_bench(Some(file), how),
+        Asked::Flash(how) => start_bench(None, how),
+        Asked::Instrument(injection, seconds) => start_instrument(nvic, injection, seconds),
     };
-    let tachometer = tachometer(header.geometry);
-    let (sender, receiver) = CHANNEL.init(Channel::new(BUFFERS.take())).split();
-
-    Irq::Measure.set_priority(&mut peripherals.NVIC, 0xC0);
-    Irq::Intake.set_priority(&mut peripherals.NVIC, 0x80);
-    match (measure_all(tachometer, header, receiver, pace), take_in(file, header, pace, sender)) {
-        (Ok(measure), Ok(intake)) => {
-            MEASURE.start(Irq::Measure).spawn(measure);
-            INTAKE.start(Irq::Intake).spawn(intake);
-        }
-        (Err(error), _) | (_, Err(error)) => fail(error),
-    }
-    loop {
-        cortex_m::asm::wfi();
-    }
-}
-
-/// The tachometer over the device's memory.
-///
-/// A function of its own, because parts of it are built on the stack first, and `main` never gives
-/// back what its frame takes.
-#[inline(never)]
-fn tachometer(geometry: Geometry) -> &'static mut Tachometer<'static> {
-    let events = STORE.init_with(|| [StoredEvent::default(); DEVICE_EVENTS]);
-    let memory = Memory { events, heat: HEAT.take(), weights: WEIGHTS.take() };
-    TACHOMETER.init_with(|| Tachometer::new(Settings::new(geometry), memory))
-}
-
-/// The file and the pace that the command line asks for.
-fn command_line() -> (File, Pace) {
-    let Ok(arguments) = env::args::<PATH_BYTES>() else { fail("the command line is too long") };
-    let mut arguments = (&arguments).skip(1).map(|argument| argument.unwrap_or_default());
-    let (Some(path), pace) = (arguments.next(), arguments.next()) else {
-        fail("usage: FILE [sensor]");
-    };
-    let pace = match pace {
-        None => Pace::File,
-        Some("sensor") => Pace::Sensor,
-        Some(_) => fail("usage: FILE [sensor]"),
-    };
-    let mut bytes = [0; PATH_BYTES];
-    bytes[..path.len()].copy_from_slice(path.as_bytes());
-    let Ok(path) = CStr::from_bytes_until_nul(&bytes) else { fail("the path is too long") };
-    match fs::File::open(path) {
-        Ok(file) => (File(file), pace),
-        Err(error) => fail(error),
-    }
-}
-
-#[embassy_executor::task]
-async fn take_in(
-    mut file: File,
-    header: Header,
-    pace: Pace,
-    mut blocks: Sender<'static, Mutex, Block>,
-) {
-    if let Err(error) = intake::take_in(&mut file, &header, pace, &mut blocks).await {
+    if let Err(error) = started {
         fail(error);
     }
+    loop {
+        // With interrupts held back, so that what they do is not taken for sleep.
+        cortex_m::interrupt::free(|_| charge(User::Sleep, cortex_m::asm::wfi));
+    }
 }
 
-#[embassy_executor::task]
-async fn measure_all(
-    tachometer: &'static mut Tachometer<'static>,
-    header: Header,
-    mut blocks: Receiver<'static, Mutex, Block>,
-    pace: Pace,
-) {
-    let mut console = Console::default();
-    let mut costs = Costs::new(Ticks);
-    let mut seen_speed = false;
-    let show = |reading: &Reading, Spent { push, poll }| {
-        seen_speed |= reading.rotors.iter().any(|rotor| rotor.speed.is_some());
-        writeln!(console, "{}spent push={push} poll={poll}", Lines(reading)).ok();
-        console.flush();
+// Neither is inlined: `main` never gives back what its frame takes.
+#[inline(never)]
+fn start_bench(
+    file: Option<File>,
+    How { pace, screen }: How,
+) -> Result<(), embassy_executor::SpawnError> {
+    let (sender, receiver) = memory::blocks();
+    let psram = if screen { psram::take() } else { None };
+    let film = psram.map(bench::film);
+    let measure = bench::measure_all(memory::tachometer(), receiver, pace, film)?;
+    cortex_m::interrupt::free(|_| stack::start_running());
+    MEASURE.start(Irq::Measure).spawn(measure);
+    let acquire = ACQUIRE.start(Irq::Acquire);
+    match file {
+        Some(file) => acquire.spawn(bench::take_in_file(file, pace, sender)?),
+        None => acquire.spawn(bench::take_in_spi(pace, sender)?),
+    }
+    Ok(())
+}
+
+#[inline(never)]
+fn start_instrument(
+    nvic: &mut NVIC,
+    injection: Injection,
+    seconds: Option<u32>,
+) -> Result<(), embassy_executor::SpawnError> {
+    let Some(psram) = psram::take() else { fail("the external memory is taken") };
+    let parts = program::prepare(psram, injection);
+    let (sender, receiver) = memory::blocks();
+    let (tachometer, injection) = (memory::tachometer(), parts.injection);
+    cortex_m::interrupt::free(|_| stack::start_running());
+    let front = FRONT.start(Irq::Front);
+    front.spawn(program::front_task(parts)?);
+    if let Some(seconds) = seconds {
+        front.spawn(program::report_task(seconds)?);
+    }
+    MEASURE.start(Irq::Measure).spawn(program::measure_task(tachometer, receiver, injection)?);
+    ACQUIRE.start(Irq::Acquire).spawn(program::acquire_task(sender, injection)?);
+    Irq::Receive.set_priority(nvic, 0x40);
+    // SAFETY: its handler touches nothing but the port and a pipe made for handlers.
+    unsafe { NVIC::unmask(Irq::Receive) };
+    Ok(())
+}
+
+/// What the command line asks for; without one, to be the instrument.
+#[inline(never)]
+fn command_line() -> Asked {
+    let Ok(arguments) = env::args::<PATH_BYTES>() else { fail("the command line is too long") };
+    let mut arguments = (&arguments).skip(1).map(|argument| argument.unwrap_or_default());
+    let Some(first) = arguments.next() else {
+        return Asked::Instrument(Injection::None, None);
     };
-    measure(tachometer, &header, &mut blocks, pace, &mut costs, show).await;
-    let mut console = Console::default();
-    writeln!(
-        console,
-        "{costs}overrun events={}\nmemory tachometer={} store={} heat={} blocks={} stack={}",
-        tachometer.ignored().overrun,
-        size_of::<Tachometer<'_>>(),
-        size_of::<[StoredEvent; DEVICE_EVENTS]>(),
-        HEAT_BYTES,
-        size_of::<[Block; BLOCKS]>(),
-        stack::deepest(),
-    )
-    .ok();
-    console.flush();
-    process::exit(i32::from(!seen_speed))
-}
-
-/// Ends the program for bad usage or input.
-fn fail(what: impl Display) -> ! {
-    semihosting::eprintln!("mps2_an500: {what}");
-    process::exit(2)
+    if first == "instrument" {
+        let (mut injection, mut seconds) = (Injection::None, None);
+        for argument in arguments {
+            let known = Injection::ALL.iter().find(|(name, _)| *name == argument);
+            match (known, argument.parse()) {
+                (Some((_, known)), _) => injection = *known,
+                (None, Ok(number)) => seconds = Some(number),
+                (None, Err(_)) => fail(USAGE),
+            }
+        }
+        return Asked::Instrument(injection, seconds);
+    }
+    let how = match arguments.next() {
+        None => How { pace: Pace::File, screen: false },
+        Some("sensor") => How { pace: Pace::Sensor, screen: false },
+        Some("screen") => How { pace: Pace::File, screen: true },
+        Some(_) => fail(USAGE),
+    };
+    if first == "spi" {
+        return Asked::Flash(how);
+    }
+    let mut bytes = [0; PATH_BYTES];
+    bytes[..first.len()].copy_from_slice(first.as_bytes());
+    let Ok(path) = CStr::from_bytes_until_nul(&bytes) else { fail("the path is too long") };
+    match fs::File::open(path) {
+        Ok(file) => Asked::File(File(file), how),
+        Err(error) => fail(error),
+    }
 }
 
 #[exception]
 unsafe fn DefaultHandler(number: i16) {
-    match Irq::from_number(number) {
+    let irq = Irq::from_number(number);
+    charge(User::System, || match irq {
+        Some(Irq::Receive) => uart::on_receive(),
         Some(Irq::Alarm) => timers::on_alarm(),
         Some(Irq::Counter) => timers::on_wrap(),
-        // SAFETY: these are the handlers of the interrupts that `main` starts the executors with,
-        // and which are masked until then.
-        Some(Irq::Intake) => unsafe { INTAKE.on_interrupt() },
+        // SAFETY: these are the handlers of the interrupts that the executors are started with, and
+        // which are masked until then.
+        Some(Irq::Acquire) => unsafe { ACQUIRE.on_interrupt() },
         Some(Irq::Measure) => unsafe { MEASURE.on_interrupt() },
+        Some(Irq::Front) => unsafe { FRONT.on_interrupt() },
         None => fail(format_args!("interrupt {number} was never asked for")),
-    }
-}
-
-#[exception]
-unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    // The stack may be what failed: begin it anew, since nothing is returned to.
-    // SAFETY: `say_fault` takes one word and never returns.
-    unsafe {
-        asm!(
-            "msr MSP, {start}",
-            "b {say_fault}",
-            start = in(reg) stack::start(),
-            say_fault = sym say_fault,
-            in("r0") frame,
-            options(noreturn),
-        )
-    }
-}
-
-extern "C" fn say_fault(frame: *const ExceptionFrame) -> ! {
-    if stack::contains(frame.addr()) {
-        // SAFETY: the processor wrote it there, and nothing has run since but the lines above.
-        let (pc, lr) = unsafe { ((*frame).pc(), (*frame).lr()) };
-        semihosting::eprintln!("mps2_an500: fault at {pc:#010x}, called from {lr:#010x}");
-    } else {
-        semihosting::eprintln!("mps2_an500: the stack grew beyond what memory.x gives it");
-    }
-    process::exit(102)
+    });
 }

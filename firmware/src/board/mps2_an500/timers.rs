@@ -3,10 +3,9 @@
 //! The dual timer runs through 32 bits at 25 MHz and counts its wraps by interrupt; timer 0 rings
 //! when the next task is due. Arm "Cortex-M System Design Kit" TRM, chapter 4; addresses and interrupts
 //! from Arm's application note AN500.
-#![expect(unsafe_code, reason = "device registers, and the vector table's link to its handlers")]
+#![expect(unsafe_code, reason = "the vector table's link to its handlers")]
 
 use core::cell::RefCell;
-use core::ptr;
 use core::sync::atomic::{AtomicU32, Ordering};
 use core::task::Waker;
 
@@ -20,24 +19,9 @@ use evtach_firmware::cost::Clock;
 /// Timer ticks in a microsecond: the board's 25 MHz.
 const TICKS_PER_US: u64 = 25;
 
-/// A device register.
-struct Register(usize);
-
-impl Register {
-    fn read(&self) -> u32 {
-        // SAFETY: every `Register` below is a readable word of the board's timers.
-        unsafe { ptr::with_exposed_provenance::<u32>(self.0).read_volatile() }
-    }
-
-    fn write(&self, value: u32) {
-        // SAFETY: every `Register` below is a writable word of the board's timers.
-        unsafe { ptr::with_exposed_provenance_mut::<u32>(self.0).write_volatile(value) }
-    }
-}
-
 /// Timer 0: counts down once and rings.
 mod alarm {
-    use super::Register;
+    use crate::register::Register;
 
     pub const CONTROL: Register = Register(0x4000_0000);
     pub const VALUE: Register = Register(0x4000_0004);
@@ -50,7 +34,7 @@ mod alarm {
 
 /// First half of the dual timer: runs freely, downwards.
 mod counter {
-    use super::Register;
+    use crate::register::Register;
 
     pub const LOAD: Register = Register(0x4000_2000);
     pub const VALUE: Register = Register(0x4000_2004);
@@ -65,14 +49,18 @@ mod counter {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u16)]
 pub enum Irq {
+    /// UART 0 has received a byte.
+    Receive = 0,
     /// Timer 0.
     Alarm = 8,
     /// Dual timer.
     Counter = 10,
-    /// A pin's interrupt that nothing is wired to: runs the measurement by software.
+    /// A pin's interrupt that nothing is wired to: runs screen and link, by software.
+    Front = 29,
+    /// Another of them: runs the measurement.
     Measure = 30,
-    /// Another of them: runs the intake.
-    Intake = 31,
+    /// Another: reads the sensor.
+    Acquire = 31,
 }
 
 // SAFETY: the numbers are those of the board's vector table.
@@ -85,12 +73,12 @@ unsafe impl InterruptNumber for Irq {
 impl Irq {
     /// The interrupt of this number, when it is one of these.
     pub fn from_number(number: i16) -> Option<Self> {
-        [Self::Alarm, Self::Counter, Self::Measure, Self::Intake]
+        [Self::Receive, Self::Alarm, Self::Counter, Self::Front, Self::Measure, Self::Acquire]
             .into_iter()
             .find(|irq| *irq as i16 == number)
     }
 
-    /// Lower is more urgent: time before intake before measuring.
+    /// Lower is more urgent: time, then acquiring, screen and link, measuring.
     pub fn set_priority(self, nvic: &mut NVIC, priority: u8) {
         // SAFETY: no critical section here rests on a priority; they all mask every interrupt.
         unsafe { nvic.set_priority(self, priority) }

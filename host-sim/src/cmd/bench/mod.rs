@@ -5,6 +5,7 @@
 
 mod accuracy;
 mod blind;
+mod budget;
 mod decode;
 mod drive;
 mod peers;
@@ -28,6 +29,8 @@ pub struct Args {
 enum Table {
     /// Instructions and bytes on the device, counted in QEMU.
     Cost(cost::Args),
+    /// Instructions a second of the whole instrument, its RAM and flash, against their limits.
+    Budget(budget::Args),
     /// Events decoded a second, for each format, beside faery.
     Decode(decode::Args),
     /// Relative error by speed, distance, blades, hand and vibration: the paper's evaluations.
@@ -63,7 +66,7 @@ pub struct Common {
 /// Runs the subcommand.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let common = match &args.table {
-        Table::Cost(_) | Table::Decode(_) => None,
+        Table::Cost(_) | Table::Budget(_) | Table::Decode(_) => None,
         Table::Accuracy(args) => Some(args.common),
         Table::Blind(args) => Some(args.common),
         Table::Peers(args) => Some(args.common),
@@ -74,6 +77,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     let report = match args.table {
         Table::Cost(args) => return cost::run(args),
+        Table::Budget(args) => return budget::run(&args),
         Table::Decode(args) => return decode::run(&args),
         Table::Accuracy(args) => accuracy::run(&args)?,
         Table::Blind(args) => blind::run(&args)?,

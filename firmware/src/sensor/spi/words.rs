@@ -1,0 +1,90 @@
+//! The events in a frame.
+
+use evtach_core::Event;
+use evtach_core::decode::{Evt2, Evt3};
+
+use super::frame::Kind;
+use super::parser::Frame;
+
+/// Most events that one word of EVT 3 stands for: a vector.
+const VECTOR_EVENTS: usize = 12;
+
+/// Span of the words' own clocks in microseconds.
+const EVT2_SPAN_US: u64 = 1 << 34;
+const EVT3_SPAN_US: u64 = 1 << 24;
+
+/// The words of a frame, decoded one by one. Every frame begins with its time (EVT 3: and row), so a frame
+/// that was lost takes nothing with it but its own events.
+#[derive(Clone, Debug)]
+pub struct Words<'f> {
+    rest: &'f [u8],
+    /// What the words' clock leaves out of the time.
+    base_us: u64,
+    decoder: Decoder,
+}
+
+#[derive(Clone, Debug)]
+enum Decoder {
+    Evt2(Evt2),
+    Evt3(Evt3),
+    /// The frame carries no words.
+    None,
+}
+
+impl<'f> Words<'f> {
+    /// The words of a frame.
+    #[must_use]
+    pub const fn new(frame: &Frame<'f>) -> Self {
+        let (decoder, span_us) = match frame.header.kind {
+            Kind::Evt2 => (Decoder::Evt2(Evt2::new()), EVT2_SPAN_US),
+            Kind::Evt3 => (Decoder::Evt3(Evt3::new()), EVT3_SPAN_US),
+            Kind::Hello | Kind::End => (Decoder::None, 1),
+        };
+        Self { rest: frame.payload, base_us: frame.header.t_us & !(span_us - 1), decoder }
+    }
+
+    /// Most events that one of these words stands for.
+    #[must_use]
+    pub const fn most_events_a_word(&self) -> usize {
+        match self.decoder {
+            Decoder::Evt3(_) => VECTOR_EVENTS,
+            Decoder::Evt2(_) | Decoder::None => 1,
+        }
+    }
+
+    /// Whether every word has been decoded.
+    #[must_use]
+    pub const fn is_done(&self) -> bool {
+        self.rest.is_empty()
+    }
+
+    /// Decodes at most `words` words and hands out their events.
+    #[inline]
+    pub fn decode(&mut self, words: usize, mut emit: impl FnMut(Event)) {
+        let base_us = self.base_us;
+        let mut place =
+            |event: Event| emit(Event { t_us: base_us.saturating_add(event.t_us), ..event });
+        match &mut self.decoder {
+            Decoder::Evt2(decoder) => {
+                for word in take(&mut self.rest, words) {
+                    decoder.decode(u32::from_le_bytes(*word), &mut place);
+                }
+            }
+            Decoder::Evt3(decoder) => {
+                for word in take(&mut self.rest, words) {
+                    decoder.decode(u16::from_le_bytes(*word), &mut place);
+                }
+            }
+            Decoder::None => self.rest = &[],
+        }
+    }
+}
+
+/// Takes up to `words` words of `N` bytes off the front. A rest shorter than a word does not exist: the
+/// header would not have been read.
+fn take<'f, const N: usize>(rest: &mut &'f [u8], words: usize) -> &'f [[u8; N]] {
+    let taken = rest.len().min(words.saturating_mul(N));
+    let (now, later) = rest.split_at(taken);
+    *rest = later;
+    now.as_chunks().0
+}

@@ -1,0 +1,47 @@
+//! What goes on around the measurement on the device.
+
+use core::sync::atomic::Ordering;
+
+use evtach_core::{Reading, Settings, Tachometer};
+
+use super::shared::{Shared, Task, Wanted};
+use crate::cost::Spent;
+use crate::intake::Block;
+use crate::measure::Companion;
+
+/// Hands readings and pictures on, and takes what is to be looked at.
+pub struct Measuring<R> {
+    shared: &'static Shared,
+    record: R,
+}
+
+impl<R: FnMut(&Block)> Measuring<R> {
+    /// `record` gets every block, for the recorder.
+    pub const fn new(shared: &'static Shared, record: R) -> Self {
+        Self { shared, record }
+    }
+}
+
+impl<R: FnMut(&Block)> Companion for Measuring<R> {
+    fn arrived(&mut self, block: &Block) {
+        (self.record)(block);
+    }
+
+    fn measured(&mut self, reading: &Reading, _: Spent) {
+        if self.shared.readings.try_send(reading.clone()).is_err() {
+            self.shared.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+
+    fn between(&mut self, tachometer: &mut Tachometer<'_>) {
+        self.shared.alive(Task::Measure);
+        if let Some(Wanted { blades, roi, window_us }) = self.shared.wanted.try_take() {
+            let settings = Settings { blades, roi, window_us, ..*tachometer.settings() };
+            tachometer.configure(settings);
+        }
+        if let Ok(picture) = self.shared.blank.try_receive() {
+            picture.take(tachometer.heat());
+            self.shared.taken.try_send(picture).ok();
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! What tasks of different priority share: bounded channels and single values, nothing else.
+
+use core::cell::Cell;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::channel::Channel;
+use embassy_sync::signal::Signal;
+use evtach_core::{Reading, Roi};
+
+use crate::instrument::Picture;
+use crate::sensor::spi::Acquired;
+
+/// Readings on their way to the instrument: at 20 a second, a tenth of a second.
+const READINGS: usize = 2;
+
+/// The tasks that must show that they are alive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u32)]
+pub enum Task {
+    /// Reads the sensor.
+    Acquire = 1,
+    /// Measures.
+    Measure = 2,
+    /// Talks over the port.
+    Link = 4,
+}
+
+impl Task {
+    const ALL: [Self; 3] = [Self::Acquire, Self::Measure, Self::Link];
+
+    /// Its name in a fault's words.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Acquire => "acquire",
+            Self::Measure => "measure",
+            Self::Link => "link",
+        }
+    }
+}
+
+/// What the measurement is to look at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wanted {
+    /// Blades, where a person knows them.
+    pub blades: Option<u8>,
+    /// Part of the sensor.
+    pub roi: Option<Roi>,
+    /// Length of the window in microseconds.
+    pub window_us: Option<u32>,
+}
+
+/// Everything between the tasks but the blocks of events.
+pub struct Shared {
+    acquired: Mutex<CriticalSectionRawMutex, Cell<Acquired>>,
+    pub(super) readings: Channel<CriticalSectionRawMutex, Reading, READINGS>,
+    pub(super) dropped: AtomicU32,
+    pub(super) wanted: Signal<CriticalSectionRawMutex, Wanted>,
+    /// A picture to be taken, and one that has been.
+    pub(super) blank: Channel<CriticalSectionRawMutex, &'static mut Picture, 1>,
+    pub(super) taken: Channel<CriticalSectionRawMutex, &'static mut Picture, 1>,
+    alive: AtomicU32,
+}
+
+impl Default for Shared {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Shared {
+    /// Nothing has happened yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            acquired: Mutex::new(Cell::new(Acquired::NONE)),
+            readings: Channel::new(),
+            dropped: AtomicU32::new(0),
+            wanted: Signal::new(),
+            blank: Channel::new(),
+            taken: Channel::new(),
+            alive: AtomicU32::new(0),
+        }
+    }
+
+    /// Lends the memory of the picture that goes back and forth between measuring and showing.
+    pub fn lend(&self, picture: &'static mut Picture) {
+        self.blank.try_send(picture).ok();
+    }
+
+    /// How acquisition stands: told by the acquiring task, which is alive then.
+    pub fn tell_acquired(&self, acquired: &Acquired) {
+        self.acquired.lock(|cell| cell.set(*acquired));
+        self.alive(Task::Acquire);
+    }
+
+    /// How acquisition stands.
+    #[must_use]
+    pub fn acquired(&self) -> Acquired {
+        self.acquired.lock(Cell::get)
+    }
+
+    /// A task says that it is alive.
+    pub fn alive(&self, task: Task) {
+        self.alive.fetch_or(task as u32, Ordering::Relaxed);
+    }
+
+    /// Whether every task has said so since the last time that all had.
+    pub fn all_alive(&self) -> bool {
+        let all = Task::ALL.iter().fold(0, |all, task| all | *task as u32);
+        let alive = self.alive.load(Ordering::Relaxed) == all;
+        if alive {
+            self.alive.store(0, Ordering::Relaxed);
+        }
+        alive
+    }
+
+    /// The first task that has not, for the words of a fault.
+    #[must_use]
+    pub fn missing(&self) -> Option<Task> {
+        let alive = self.alive.load(Ordering::Relaxed);
+        Task::ALL.into_iter().find(|task| alive & *task as u32 == 0)
+    }
+}

@@ -1,0 +1,119 @@
+//! The big number with its unit, and the line below it: error, direction, blades, or what to do.
+
+use core::fmt::Write as _;
+
+use embedded_graphics::pixelcolor::Rgb565;
+use embedded_graphics::prelude::*;
+use evtach_core::Direction;
+use heapless::String;
+
+use super::text::{self, Align, HUGE, Ink, MEDIUM, SMALL, width};
+use super::theme::{self, BACK, BAD, DIM, FAINT, TEXT, area};
+use crate::instrument::{Mode, State, View};
+
+/// Where the number ends.
+const RIGHT: i32 = 396;
+const BASELINE: i32 = 107;
+const DETAILS_BASELINE: i32 = 134;
+/// Where the unit begins.
+const UNIT: i32 = 406;
+const DASHES: &str = "-----";
+
+pub fn changed(a: &View, b: &View) -> bool {
+    let of = |v: &View| {
+        (v.speed.map(|s| s.value), v.state, v.mode, v.rotor, alarmed(v), v.preferences.unit)
+    };
+    of(a) != of(b)
+}
+
+/// Whether the big number is beyond a limit.
+fn alarmed(view: &View) -> bool {
+    view.mode == Mode::Live && view.alarm.is_some_and(|(id, _)| Some(id) == view.rotor)
+}
+
+pub fn draw<D: DrawTarget<Color = Rgb565>>(target: &mut D, view: &View) -> Result<(), D::Error> {
+    target.fill_solid(&area(0, 28, 480, 86), BACK)?;
+    let end = Point::new(RIGHT, BASELINE);
+    let faint = Ink { colour: FAINT, paper: BACK };
+    if let Some(speed) = view.speed {
+        let old = view.mode == Mode::Live && view.state == State::Held;
+        let colour = match () {
+            () if alarmed(view) => BAD,
+            () if old => DIM,
+            () => TEXT,
+        };
+        let mut digits = String::<12>::new();
+        write!(digits, "{}", speed.value).ok();
+        let (said, filled) = digits.split_at(digits.len().saturating_sub(speed.value.filled()));
+        text::draw(target, &HUGE, filled, end, Align::Right, faint)?;
+        let end = end - Point::new(width(&HUGE, filled), 0);
+        text::draw(target, &HUGE, said, end, Align::Right, Ink { colour, paper: BACK })?;
+    } else {
+        text::draw(target, &HUGE, DASHES, end, Align::Right, faint)?;
+    }
+    let ink = Ink { colour: DIM, paper: BACK };
+    let at = Point::new(UNIT, BASELINE);
+    text::draw(target, &MEDIUM, view.preferences.unit.as_str(), at, Align::Left, ink)?;
+    if let Some(id) = view.rotor.filter(|_| view.speed.is_some()) {
+        let ink = Ink { colour: theme::of_rotor(id), paper: BACK };
+        let at = Point::new(UNIT, BASELINE - 57);
+        text::draw(target, &MEDIUM, theme::letter(id), at, Align::Left, ink)?;
+    }
+    Ok(())
+}
+
+pub fn details_changed(a: &View, b: &View) -> bool {
+    let of = |v: &View| {
+        (v.speed, v.state, v.direction, v.blades, v.preferences.blades, v.preferences.unit)
+    };
+    of(a) != of(b)
+}
+
+pub fn draw_details<D: DrawTarget<Color = Rgb565>>(
+    target: &mut D,
+    view: &View,
+) -> Result<(), D::Error> {
+    target.fill_solid(&area(0, 114, 480, 28), BACK)?;
+    let left = Point::new(8, DETAILS_BASELINE);
+    let ink = Ink { colour: DIM, paper: BACK };
+    let advice = view.state.advice();
+    if !advice.is_empty() {
+        let ink = Ink { colour: TEXT, paper: BACK };
+        text::draw(target, &SMALL, advice, left, Align::Left, ink)?;
+    } else if let Some(direction) = view.direction {
+        draw_turning(target, left, direction, view)?;
+    }
+    if let Some(speed) = view.speed {
+        let mut error = String::<16>::new();
+        write!(error, "± {}", speed.error).ok();
+        let right = Point::new(RIGHT, DETAILS_BASELINE);
+        text::draw(target, &MEDIUM, &error, right, Align::Right, ink)?;
+    }
+    Ok(())
+}
+
+/// Direction and blades.
+fn draw_turning<D: DrawTarget<Color = Rgb565>>(
+    target: &mut D,
+    left: Point,
+    direction: Direction,
+    view: &View,
+) -> Result<(), D::Error> {
+    theme::draw_sense(target, left + Point::new(6, -6), 6, direction, DIM)?;
+    let mut words = String::<48>::new();
+    words.push_str(in_words(direction)).ok();
+    if let Some(blades) = view.blades {
+        let plural = if blades == 1 { "" } else { "s" };
+        let set = if view.preferences.blades.is_some() { " set" } else { "" };
+        write!(words, "  ·  {blades} blade{plural}{set}").ok();
+    }
+    let at = left + Point::new(20, 0);
+    text::draw(target, &SMALL, &words, at, Align::Left, Ink { colour: DIM, paper: BACK })
+}
+
+const fn in_words(direction: Direction) -> &'static str {
+    match direction {
+        Direction::Cw => "clockwise",
+        Direction::Ccw => "counter-clockwise",
+    }
+}

@@ -1,0 +1,121 @@
+//! Colours, measures, and the few shapes that everything is made of.
+
+use embedded_graphics::pixelcolor::Rgb565;
+use embedded_graphics::prelude::*;
+use embedded_graphics::primitives::{
+    Circle, CornerRadii, PrimitiveStyle, Rectangle, RoundedRectangle, StyledDrawable as _, Triangle,
+};
+use evtach_core::Direction;
+
+use crate::instrument::State;
+
+/// Size of the screen in pixels.
+pub const SIZE: Size = Size::new(480, 272);
+
+/// From eight bits a channel.
+const fn rgb(red: u8, green: u8, blue: u8) -> Rgb565 {
+    Rgb565::new(red >> 3, green >> 2, blue >> 3)
+}
+
+/// What everything stands on.
+pub const BACK: Rgb565 = rgb(10, 13, 18);
+/// Keys, and places where something is to come.
+pub const PANEL: Rgb565 = rgb(28, 34, 44);
+/// What is chosen, or pressed.
+pub const RAISED: Rgb565 = rgb(52, 64, 82);
+/// Numbers.
+pub const TEXT: Rgb565 = rgb(244, 247, 250);
+/// Labels, and numbers of the past.
+pub const DIM: Rgb565 = rgb(142, 154, 170);
+/// Dashes, and zeros that only hold a place.
+pub const FAINT: Rgb565 = rgb(78, 89, 105);
+/// All is well.
+pub const GOOD: Rgb565 = rgb(64, 220, 150);
+/// Look at it.
+pub const WARN: Rgb565 = rgb(255, 184, 76);
+/// Act.
+pub const BAD: Rgb565 = rgb(255, 96, 96);
+/// A zone to keep out of.
+pub const BAD_ZONE: Rgb565 = rgb(96, 32, 36);
+/// What is neither good nor bad.
+pub const ACCENT: Rgb565 = rgb(92, 190, 255);
+/// The error about a reading of the trend.
+pub const ACCENT_ZONE: Rgb565 = rgb(28, 66, 96);
+
+/// Colours of the letters, in their order.
+const LETTERS: [Rgb565; 8] = [
+    rgb(92, 190, 255),
+    rgb(255, 184, 76),
+    rgb(64, 220, 150),
+    rgb(255, 128, 200),
+    rgb(190, 160, 255),
+    rgb(240, 230, 90),
+    rgb(255, 140, 110),
+    rgb(120, 230, 230),
+];
+
+/// Colour of a rotor.
+pub fn of_rotor(id: u8) -> Rgb565 {
+    LETTERS[usize::from(id) % LETTERS.len()]
+}
+
+/// Colour of a state's word.
+pub const fn of_state(state: State) -> Rgb565 {
+    use evtach_core::Reason;
+    match state {
+        State::Locked => GOOD,
+        State::Coarse => WARN,
+        State::Held => DIM,
+        State::Refused(Reason::Searching) => ACCENT,
+        State::Refused(Reason::NoSensor | Reason::Saturated | Reason::Fault) | State::Fault(_) => {
+            BAD
+        }
+        State::Refused(_) => WARN,
+    }
+}
+
+/// A letter as text: A to Z, beyond that a question mark.
+pub fn letter(id: u8) -> &'static str {
+    const ALPHABET: &str = "ABCDEFGHIJKLMNOPQRSTUVWXYZ";
+    let at = usize::from(id);
+    ALPHABET.get(at..at + 1).unwrap_or("?")
+}
+
+/// A rectangle by its edges.
+pub const fn area(x: i32, y: i32, width: u32, height: u32) -> Rectangle {
+    Rectangle::new(Point::new(x, y), Size::new(width, height))
+}
+
+/// Fills a rectangle with rounded corners.
+///
+/// # Errors
+///
+/// Whatever the target reports.
+pub fn fill_round<D: DrawTarget<Color = Rgb565>>(
+    target: &mut D,
+    area: Rectangle,
+    colour: Rgb565,
+) -> Result<(), D::Error> {
+    let round = RoundedRectangle::new(area, CornerRadii::new(Size::new_equal(5)));
+    round.draw_styled(&PrimitiveStyle::with_fill(colour), target)
+}
+
+/// A circle with an arrow: down on its right side is clockwise.
+///
+/// # Errors
+///
+/// Whatever the target reports.
+pub fn draw_sense<D: DrawTarget<Color = Rgb565>>(
+    target: &mut D,
+    centre: Point,
+    radius: i32,
+    direction: Direction,
+    colour: Rgb565,
+) -> Result<(), D::Error> {
+    let circle = Circle::with_center(centre, 2 * radius as u32);
+    circle.draw_styled(&PrimitiveStyle::with_stroke(colour, 1), target)?;
+    let down = if direction == Direction::Cw { 1 } else { -1 };
+    let corner = |x: i32, y: i32| centre + Point::new(radius + x, y * down);
+    Triangle::new(corner(-4, -1), corner(3, -1), corner(0, 3))
+        .draw_styled(&PrimitiveStyle::with_fill(colour), target)
+}

@@ -1,0 +1,8 @@
+//! The device's own recording.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| {
+    evtach_fuzz::read_behind(b"evtach8\n", data);
+});

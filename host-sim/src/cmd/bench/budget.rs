@@ -1,0 +1,92 @@
+//! `evtach bench budget`: what the whole instrument costs on the device, and whether that is within its limits.
+//!
+//! Runs the firmware in QEMU on a made-up rotor at about a million events a second, with its screen drawn four times a second
+//! and its link telling every reading, and prints instructions a second by task, and bytes of flash and RAM. Exit code 1 past
+//! a limit.
+
+use std::process::ExitCode;
+
+use anyhow::Context as _;
+use evtach_core::Geometry;
+use evtach_firmware::sensor::spi::{Bridge, Kind};
+use evtach_host::device::{self, Image, Used};
+use evtach_host::synth::{self, Rotor, Scene};
+
+/// Arguments of `evtach bench budget`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Seconds of the board's time, 1 to 3.
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=3))]
+    seconds: u32,
+}
+
+/// Past these the command fails. What the device is to stay within is 150 million instructions a second, 320 KB of internal
+/// RAM and 256 KB of flash. Where a limit is above that, it is where things stand, so that they do not get worse: at a million
+/// events a second the processor is full, and events are left out.
+const MOST_INSTRUCTIONS_PER_S: u64 = 260_000_000;
+const MOST_RAM_BYTES: u64 = 320 * 1024;
+const MOST_FLASH_BYTES: u64 = 300 * 1024;
+
+/// Runs the subcommand.
+pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    eprintln!("building the firmware");
+    let image = device::build()?;
+    let (stream, rate) = stream(f64::from(args.seconds))?;
+    eprintln!("running it in QEMU");
+    let used = device::run_instrument(&image, &stream, args.seconds)?;
+    println!(
+        "one rotor, {:.2} Mev/s, screen at 4 Hz, every reading told over the link",
+        rate * 1e-6
+    );
+    let all = print_tasks(&used);
+    println!("  {:<24}{:>14}", "readings a second", used.readings / args.seconds.max(1));
+    let good = [
+        check("instructions a second", all, MOST_INSTRUCTIONS_PER_S),
+        check("internal RAM, bytes", print_ram(&image, &used), MOST_RAM_BYTES),
+        check("flash, bytes", image.flash_bytes, MOST_FLASH_BYTES),
+    ];
+    Ok(ExitCode::from(u8::from(!good.iter().all(|good| *good))))
+}
+
+/// A rotor in front of a DAVIS346, as an SPI bridge sends it, and its events a second.
+fn stream(seconds: f64) -> anyhow::Result<(Vec<u8>, f64)> {
+    let rotor = Rotor { blades: 3, rpm: 1500.0, radius_px: 42.0, ..Rotor::default() };
+    let duration_ms = seconds * 1e3 + 100.0;
+    let scene = Scene { duration_ms, rotors: vec![rotor], ..Scene::default() };
+    let geometry = Geometry::new(scene.width_px, scene.height_px)
+        .context("the scene's sensor is out of range")?;
+    let events = synth::generate(&scene)?.events;
+    let rate = events.len() as f64 / duration_ms * 1e3;
+    let mut bridge = Bridge::new(Kind::Evt2, geometry, "bench");
+    let mut stream = Vec::new();
+    for event in &events {
+        bridge.push(event, |frame| stream.extend_from_slice(frame));
+    }
+    bridge.end(|frame| stream.extend_from_slice(frame));
+    Ok((stream, rate))
+}
+
+/// Prints what each task used, and returns what all did.
+fn print_tasks(used: &Used) -> u64 {
+    let mut all = 0;
+    for (name, instructions) in &used.instructions {
+        if name != "sleep" {
+            all += instructions / u64::from(used.seconds.max(1));
+            println!("  {name:<24}{:>14}", instructions / u64::from(used.seconds.max(1)));
+        }
+    }
+    all
+}
+
+fn print_ram(image: &Image, used: &Used) -> u64 {
+    println!("  {:<24}{:>14}", "variables, bytes", image.ram_bytes);
+    println!("  {:<24}{:>14}", "stack while starting", used.stack_starting);
+    println!("  {:<24}{:>14}", "stack while running", used.stack_running);
+    image.ram_bytes + used.stack_starting.max(used.stack_running)
+}
+
+fn check(name: &str, value: u64, most: u64) -> bool {
+    let verdict = if value <= most { "within" } else { "PAST" };
+    println!("{name:<26}{value:>14}  {verdict} {most}");
+    value <= most
+}

@@ -1,0 +1,118 @@
+//! `evtach screen`: what the device would show of a recording, drawn by its own code.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::Context as _;
+use evtach_core::Geometry;
+use evtach_firmware::instrument::{Action, Instrument, Mode, Page, Preferences, Unit};
+use evtach_firmware::ui::Screen;
+use evtach_host::frame::Frame;
+use evtach_host::play::play;
+use evtach_host::recording::{self, OpenOptions};
+
+/// Arguments of `evtach screen`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Recording; "-" reads stdin.
+    file: PathBuf,
+    /// Picture to write, PNG of 480x272 pixels.
+    out: PathBuf,
+    /// The screen at this many seconds after the first event [default: at the end].
+    #[arg(long, value_name = "SECONDS")]
+    at: Option<f64>,
+    /// What fills the screen.
+    #[arg(long, value_enum, default_value = "main")]
+    page: PageName,
+    /// Which value the big number shows.
+    #[arg(long, value_enum, default_value = "live")]
+    mode: ModeName,
+    /// Unit of the numbers.
+    #[arg(long, value_enum, default_value = "rpm")]
+    unit: UnitName,
+    /// Blade count, when it is known.
+    #[arg(long, value_parser = clap::value_parser!(u8).range(1..=32))]
+    blades: Option<u8>,
+    /// Size of the sensor, where the recording does not say it or says it wrong.
+    #[arg(long, value_name = "WxH", value_parser = recording::parse_geometry)]
+    geometry: Option<Geometry>,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum PageName {
+    Main,
+    Aim,
+    Settings,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum ModeName {
+    Live,
+    Hold,
+    Max,
+    Min,
+    Mean,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum UnitName {
+    Rpm,
+    Hz,
+    #[value(name = "rad/s")]
+    RadPerS,
+    Ms,
+}
+
+impl Args {
+    fn actions(&self) -> [Action; 2] {
+        let page = match self.page {
+            PageName::Main => Page::Main,
+            PageName::Aim => Page::Aim,
+            PageName::Settings => Page::Settings,
+        };
+        let mode = match self.mode {
+            ModeName::Live => Mode::Live,
+            ModeName::Hold => Mode::Hold,
+            ModeName::Max => Mode::Max,
+            ModeName::Min => Mode::Min,
+            ModeName::Mean => Mode::Mean,
+        };
+        [Action::Page(page), Action::Mode(mode)]
+    }
+
+    fn preferences(&self) -> Preferences {
+        let unit = match self.unit {
+            UnitName::Rpm => Unit::Rpm,
+            UnitName::Hz => Unit::Hertz,
+            UnitName::RadPerS => Unit::RadPerS,
+            UnitName::Ms => Unit::MsPerTurn,
+        };
+        Preferences { unit, blades: self.blades, ..Preferences::default() }
+    }
+}
+
+/// Runs the subcommand: 0 when the screen shows a speed, else 1.
+pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let name = args.file.display().to_string();
+    let mut recording = recording::open(&args.file, &OpenOptions { geometry: args.geometry })
+        .with_context(|| name.clone())?;
+    for assumed in &recording.assumed {
+        eprintln!("{name}: {assumed}");
+    }
+    let mut instrument = Instrument::new(args.preferences());
+    let until_us = args.at.map(|seconds| (seconds.max(0.0) * 1e6) as u64);
+    play(&mut recording, &mut instrument, until_us).with_context(|| name)?;
+    for action in args.actions() {
+        instrument.act(action);
+    }
+    let mut frame = Frame::default();
+    let Ok(()) = Screen::new().draw(&mut frame, &instrument);
+    frame.write_png(&args.out)?;
+    let view = instrument.view();
+    let shown = view.speed.map_or_else(
+        || view.state.advice().to_owned(),
+        |speed| format!("{} ± {} {}", speed.value, speed.error, view.preferences.unit.as_str()),
+    );
+    println!("{}: {} {}", args.out.display(), view.state.word(), shown);
+    Ok(ExitCode::from(u8::from(view.speed.is_none())))
+}

@@ -1,0 +1,104 @@
+//! `evtach watch`: a live view in the terminal.
+//!
+//! Exit code 0 when a speed was seen, 1 when none was, 2 for bad usage or input.
+
+use std::fs;
+use std::io::{self, IsTerminal as _};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context as _, bail};
+use evtach_core::Geometry;
+use evtach_host::recording::{self, OpenOptions};
+use evtach_host::watch::{Monitor, Source, draw, file, port};
+use ratatui::DefaultTerminal;
+use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+
+/// How often the view is drawn.
+const FRAME: Duration = Duration::from_millis(100);
+
+/// Arguments of `evtach watch`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// A recording, or the serial port of a device.
+    #[arg(value_name = "FILE|PORT")]
+    from: PathBuf,
+    /// How many times as fast as it was recorded a recording plays.
+    #[arg(long, value_name = "TIMES", default_value_t = 1.0, value_parser = parse_speed)]
+    speed: f64,
+    /// Speed of the serial port in bits a second; ports over USB ignore it.
+    #[arg(long, default_value_t = 115_200)]
+    baud: u32,
+    /// Size of the sensor, where the recording does not say it or says it wrong.
+    #[arg(long, value_name = "WxH", value_parser = recording::parse_geometry)]
+    geometry: Option<Geometry>,
+}
+
+fn parse_speed(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(speed) if (0.001..=1e6).contains(&speed) => Ok(speed),
+        _ => Err(format!("\"{text}\" is no speed; write a number from 0.001 to 1000000")),
+    }
+}
+
+/// Runs the subcommand.
+pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    if !io::stdout().is_terminal() {
+        bail!("watch draws on a terminal; for a pipe use `evtach measure --json`");
+    }
+    let name = args.from.display().to_string();
+    let source = if is_port(&args.from) {
+        port(&args.from, args.baud)?
+    } else {
+        let options = OpenOptions { geometry: args.geometry };
+        file(recording::open(&args.from, &options).with_context(|| name.clone())?, args.speed)
+    };
+    let mut monitor = Monitor::new(name);
+    let shown = show(ratatui::init(), &source, &mut monitor);
+    ratatui::restore();
+    shown.context("the terminal failed")?;
+    Ok(ExitCode::from(u8::from(!monitor.seen_speed())))
+}
+
+/// Whether a path is a device: recordings are files.
+fn is_port(path: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::FileTypeExt as _;
+        fs::metadata(path).is_ok_and(|metadata| metadata.file_type().is_char_device())
+    }
+    #[cfg(not(unix))]
+    {
+        !path.exists() || fs::metadata(path).is_err()
+    }
+}
+
+/// Draws until q is pressed.
+fn show(mut terminal: DefaultTerminal, source: &Source, monitor: &mut Monitor) -> io::Result<()> {
+    let start = Instant::now();
+    loop {
+        while let Ok(told) = source.told.try_recv() {
+            monitor.take(told, start.elapsed());
+        }
+        terminal.draw(|frame| draw(frame, monitor, start.elapsed()))?;
+        if !event::poll(FRAME)? {
+            continue;
+        }
+        match event::read()? {
+            Event::Key(key) if key.kind == KeyEventKind::Press => match key.code {
+                _ if asks_to_quit(&key) => return Ok(()),
+                KeyCode::Tab => monitor.choose_next(),
+                _ => {}
+            },
+            _ => {}
+        }
+    }
+}
+
+/// In raw mode Control-C is a key like any other.
+fn asks_to_quit(key: &KeyEvent) -> bool {
+    let control = key.modifiers.contains(KeyModifiers::CONTROL);
+    matches!(key.code, KeyCode::Char('q') | KeyCode::Esc)
+        || (control && key.code == KeyCode::Char('c'))
+}

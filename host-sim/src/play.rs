@@ -1,0 +1,95 @@
+//! A recording played through the device's tachometer and instrument.
+
+use evtach_core::{Event, Settings, Tachometer};
+use evtach_firmware::instrument::{Instrument, Picture, Sensor, Traffic};
+
+use crate::measure::{Capacity, drain, feed, with_tachometer};
+use crate::recording::{Recording, RecordingError};
+
+/// How often the instrument is told the time and given a picture: as the device does, four times a second.
+const FRAME_US: u64 = 250_000;
+
+/// Plays a recording with the device's memory until its end, or until `until_us` microseconds after its first event.
+///
+/// # Errors
+///
+/// When the recording is damaged before its first event; after that, what came before it is played.
+pub fn play(
+    recording: &mut Recording,
+    instrument: &mut Instrument,
+    until_us: Option<u64>,
+) -> Result<(), RecordingError> {
+    let mut settings = Settings::new(recording.geometry);
+    settings.blades = instrument.preferences().blades;
+    instrument.set_sensor(Sensor::Present);
+    with_tachometer(settings, Capacity::Device, |tachometer| {
+        let mut player =
+            Player { tachometer, instrument, traffic: Traffic::default(), next_us: None };
+        let mut chunk: Vec<Event> = Vec::new();
+        let mut end_us = None;
+        loop {
+            chunk.clear();
+            let read = recording.read_chunk(&mut chunk);
+            if let (Some(first), Some(until_us)) = (chunk.first(), until_us) {
+                let end_us = *end_us.get_or_insert(first.t_us.saturating_add(until_us));
+                chunk.truncate(chunk.partition_point(|event| event.t_us <= end_us));
+            }
+            player.lost(recording.lost());
+            player.events(&chunk);
+            let cut = end_us.is_some() && chunk.is_empty();
+            match read {
+                Ok(true) if !cut => {}
+                Err(error) if player.traffic.events == 0 => return Err(error),
+                Ok(_) | Err(_) => break,
+            }
+        }
+        if until_us.is_none() {
+            player.finish();
+        }
+        Ok(())
+    })
+}
+
+/// The device's tasks, one after the other.
+struct Player<'p, 'm> {
+    tachometer: &'p mut Tachometer<'m>,
+    instrument: &'p mut Instrument,
+    traffic: Traffic,
+    next_us: Option<u64>,
+}
+
+impl Player<'_, '_> {
+    fn lost(&mut self, lost: u64) {
+        self.tachometer.lost(lost.saturating_sub(self.traffic.lost));
+        self.traffic.lost = lost;
+    }
+
+    fn events(&mut self, events: &[Event]) {
+        for piece in events.chunk_by(|a, b| a.t_us / FRAME_US == b.t_us / FRAME_US) {
+            let Some(last) = piece.last() else { continue };
+            let instrument = &mut *self.instrument;
+            feed(self.tachometer, piece, &mut &[][..], |reading| instrument.observe(&reading));
+            self.traffic.events += piece.len() as u64;
+            if self.next_us.is_none_or(|next_us| last.t_us >= next_us) {
+                self.next_us = Some(last.t_us.saturating_add(FRAME_US));
+                self.frame(last.t_us);
+            } else {
+                self.instrument.tick(last.t_us, self.traffic);
+            }
+        }
+    }
+
+    fn frame(&mut self, now_us: u64) {
+        self.instrument.tick(now_us, self.traffic);
+        let mut picture = Picture::EMPTY;
+        picture.take(self.tachometer.heat());
+        self.instrument.show_picture(&picture);
+    }
+
+    /// Measures what is in the window, as the device does when a recording ends.
+    fn finish(&mut self) {
+        self.tachometer.finish();
+        let instrument = &mut *self.instrument;
+        drain(self.tachometer, |reading| instrument.observe(&reading));
+    }
+}

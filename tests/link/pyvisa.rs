@@ -1,0 +1,207 @@
+//! Stock PyVISA in front of the link: over a pseudo-terminal, as a serial port, and over TCP.
+//!
+//! The device is the firmware's own link, recorder and core, on the PC; its light is made up.
+
+#[path = "bench.rs"]
+#[expect(dead_code, reason = "shared with other tests")]
+mod bench;
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use bench::Bench;
+use evtach_core::{Event, Geometry, Reading, Settings, Speed};
+use evtach_firmware::instrument::Sensor;
+use evtach_firmware::scpi::Link;
+use evtach_host::measure::{Capacity, measure_events};
+use evtach_host::recording::{self, OpenOptions};
+use evtach_host::synth::{self, Rotor, Scene};
+use serialport::{SerialPort as _, TTYPort};
+
+/// Longest session that is not taken for a hang.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+fn interop() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("interop")
+}
+
+/// Python with PyVISA, or `None` where it cannot be had.
+fn python() -> Option<String> {
+    let output = Command::new("bash").arg(interop().join("setup.sh")).arg("visa").output();
+    match output {
+        Ok(output) if output.status.success() => {
+            Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+        }
+        Ok(output) => {
+            println!("skipped: no PyVISA ({})", String::from_utf8_lossy(&output.stderr).trim());
+            None
+        }
+        Err(error) => {
+            println!("skipped: no shell ({error})");
+            None
+        }
+    }
+}
+
+/// A device in front of a propeller at 1500 rpm, which it sees in real time, again and again.
+struct Player {
+    bench: Bench,
+    events: Vec<Event>,
+    readings: Vec<Reading>,
+    /// When the light began.
+    since: Instant,
+    /// Events and readings that have been.
+    played: (usize, usize),
+    recording: bool,
+}
+
+impl Player {
+    fn new() -> Self {
+        let rotor = Rotor { blades: 5, rpm: -1500.0, ..Rotor::default() };
+        let scene = Scene { duration_ms: 800.0, rotors: vec![rotor], ..Scene::default() };
+        let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
+        let events = synth::generate(&scene).expect("a scene in range").events;
+        let (readings, _) = measure_events(&events, &[], Settings::new(geometry), Capacity::Device);
+        let mut bench = Bench::new(8 * 200_000);
+        bench.geometry = Some(geometry);
+        bench.sensor = Sensor::Present;
+        bench.first_us = events.first().map_or(0, |event| event.t_us);
+        Self { bench, events, readings, since: Instant::now(), played: (0, 0), recording: false }
+    }
+
+    fn play(&mut self) {
+        let recording = self.bench.recorder.as_ref().is_some_and(|recorder| recorder.is_running());
+        // A recording begins with the light, so that it holds no seam.
+        if self.played.0 == self.events.len() || recording && !self.recording {
+            self.since = Instant::now();
+            self.played = (0, 0);
+        }
+        self.recording = recording;
+        let now_us = self.bench.first_us + self.since.elapsed().as_micros() as u64;
+        let events = &self.events[self.played.0..];
+        let events = &events[..events.partition_point(|event| event.t_us <= now_us)];
+        self.played.0 += events.len();
+        self.bench.record(events);
+        while let Some(reading) = self.readings.get(self.played.1)
+            && reading.t_us + u64::from(reading.window_us / 2) <= now_us
+        {
+            self.played.1 += 1;
+            let reading = reading.clone();
+            self.bench.alarm = reading.rotors.iter().any(|rotor| {
+                let limit = self.bench.preferences.alarm.high_rpm.unwrap_or(f32::INFINITY);
+                rotor.speed.is_some_and(|speed| speed.rpm() > limit)
+            });
+            self.bench.show(reading);
+        }
+    }
+
+    /// Answers on a port until the client has gone.
+    fn serve(&mut self, port: &mut (impl Read + Write), client: &mut Child) {
+        let start = Instant::now();
+        let mut link = Link::new();
+        let (mut received, mut sending) = (Vec::new(), Vec::new());
+        while client.try_wait().expect("a child").is_none() {
+            assert!(start.elapsed() < PATIENCE, "the session hangs");
+            self.play();
+            let mut bytes = [0; 64];
+            let count = unless_late(port.read(&mut bytes));
+            received.extend_from_slice(&bytes[..count]);
+            let taken = link.receive(&received);
+            received.drain(..taken);
+            loop {
+                link.run(start.elapsed().as_micros() as u64, &mut self.bench);
+                if sending.is_empty() {
+                    let mut piece = [0; 512];
+                    let count = link.transmit(&mut piece, &mut self.bench);
+                    sending.extend_from_slice(&piece[..count]);
+                }
+                let sent = unless_late(port.write(&sending));
+                sending.drain(..sent);
+                if sent == 0 {
+                    break;
+                }
+            }
+        }
+    }
+}
+
+/// Bytes moved, none within the port's timeout or while nobody has opened the other end.
+fn unless_late(result: std::io::Result<usize>) -> usize {
+    result.unwrap_or_else(|error| {
+        let late = [ErrorKind::TimedOut, ErrorKind::WouldBlock, ErrorKind::BrokenPipe];
+        assert!(late.contains(&error.kind()), "{error}");
+        0
+    })
+}
+
+/// Starts the session; what it prints is one JSON object.
+fn session(python: &str, port: &str, out: &Path) -> Child {
+    Command::new(python)
+        .arg(interop().join("pyvisa_session.py"))
+        .arg(port)
+        .arg(out)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the virtual environment's Python runs")
+}
+
+fn check(client: Child, out: &Path) {
+    let output = client.wait_with_output().expect("a child");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let found: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let number = |name: &str| found[name].as_f64().expect("a number");
+    assert_eq!(found["identity"], "EV-Tach,EV-Tach,0,1.2.3");
+    assert_eq!((number("blades"), number("limit_hz")), (5.0, 30.0));
+    assert!((number("speed_hz") / 25.0 - 1.0).abs() < 0.01, "{found}");
+    assert!((number("speed_rpm") / 1500.0 - 1.0).abs() < 0.01, "{found}");
+    assert!(number("sigma_rpm") > 0.0 && number("sigma_rpm") < 15.0, "{found}");
+    assert_eq!((&found["direction"], number("alarm")), (&"CCW".into(), 0.0));
+    assert!(found["error"].as_str().is_some_and(|error| error.starts_with("-222,\"")), "{found}");
+    assert_eq!((number("events"), &found["no_error"]), (16.0, &"0,\"No error\"".into()));
+    assert!(found["log"]["rotors"][0]["rpm"].is_number(), "{found}");
+    assert_eq!(found["after"], "1");
+
+    let mut recording = recording::open(out, &OpenOptions::default()).expect("what was fetched");
+    let mut events = Vec::new();
+    while recording.read_chunk(&mut events).expect("an undamaged recording") {}
+    assert_eq!((recording.format, events.len()), ("EV8", 100_000));
+    assert_eq!(recording.side().notes, [""; 0]);
+    let settings = Settings::new(recording.geometry);
+    let (readings, _) = measure_events(&events, &[], settings, Capacity::Device);
+    let speeds = readings.iter().flat_map(|reading| &reading.rotors).filter_map(|r| r.speed);
+    let speeds: Vec<f32> = speeds.map(|s| s.omega_rad_s * Speed::RPM_PER_RAD_S).collect();
+    assert!(!speeds.is_empty(), "no speed in {} events", events.len());
+    assert!(speeds.iter().all(|rpm| (rpm / -1500.0 - 1.0).abs() < 0.01), "{speeds:?}");
+}
+
+fn out(name: &str) -> PathBuf {
+    std::env::temp_dir().join(format!("evtach-{name}-{}.ev8", std::process::id()))
+}
+
+#[test]
+fn over_a_serial_port_and_over_tcp() {
+    let Some(python) = python() else { return };
+    let mut player = Player::new();
+
+    let (mut master, slave) = TTYPort::pair().expect("a pseudo-terminal");
+    master.set_timeout(Duration::from_millis(1)).expect("a timeout");
+    let file = out("serial");
+    let mut client = session(&python, &slave.name().expect("a name"), &file);
+    player.serve(&mut master, &mut client);
+    check(client, &file);
+    std::fs::remove_file(&file).expect("the recording");
+
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let port = listener.local_addr().expect("an address").port();
+    let file = out("tcp");
+    let mut client = session(&python, &format!("TCPIP::127.0.0.1::{port}::SOCKET"), &file);
+    let (mut stream, _) = listener.accept().expect("the client connects");
+    stream.set_read_timeout(Some(Duration::from_millis(1))).expect("a timeout");
+    player.serve(&mut stream, &mut client);
+    check(client, &file);
+    std::fs::remove_file(&file).expect("the recording");
+}
