@@ -6,8 +6,10 @@ use evtach_firmware::instrument::{Instrument, Picture, Sensor, Traffic};
 use crate::measure::{Capacity, drain, feed, with_tachometer};
 use crate::recording::{Recording, RecordingError};
 
-/// How often the instrument is told the time and given a picture: as the device does, four times a second.
-const FRAME_US: u64 = 250_000;
+/// How often the instrument is told the time.
+const TICK_US: u64 = 10_000;
+/// How often it is given a picture: as the device does, four times a second.
+const PICTURE_US: u64 = 250_000;
 
 /// Plays a recording with the device's memory until its end, or until `until_us` microseconds after its first event.
 ///
@@ -24,7 +26,7 @@ pub fn play(
     instrument.set_sensor(Sensor::Present);
     with_tachometer(settings, Capacity::Device, |tachometer| {
         let mut player =
-            Player { tachometer, instrument, traffic: Traffic::default(), next_us: None };
+            Player { tachometer, instrument, traffic: Traffic::default(), picture_us: None };
         let mut chunk: Vec<Event> = Vec::new();
         let mut end_us = None;
         loop {
@@ -43,6 +45,7 @@ pub fn play(
                 Ok(_) | Err(_) => break,
             }
         }
+        player.take_picture();
         if until_us.is_none() {
             player.finish();
         }
@@ -55,7 +58,8 @@ struct Player<'p, 'm> {
     tachometer: &'p mut Tachometer<'m>,
     instrument: &'p mut Instrument,
     traffic: Traffic,
-    next_us: Option<u64>,
+    /// When the last picture was taken.
+    picture_us: Option<u64>,
 }
 
 impl Player<'_, '_> {
@@ -65,22 +69,21 @@ impl Player<'_, '_> {
     }
 
     fn events(&mut self, events: &[Event]) {
-        for piece in events.chunk_by(|a, b| a.t_us / FRAME_US == b.t_us / FRAME_US) {
+        for piece in events.chunk_by(|a, b| a.t_us / TICK_US == b.t_us / TICK_US) {
             let Some(last) = piece.last() else { continue };
             let instrument = &mut *self.instrument;
             feed(self.tachometer, piece, &mut &[][..], |reading| instrument.observe(&reading));
             self.traffic.events += piece.len() as u64;
-            if self.next_us.is_none_or(|next_us| last.t_us >= next_us) {
-                self.next_us = Some(last.t_us.saturating_add(FRAME_US));
-                self.frame(last.t_us);
-            } else {
-                self.instrument.tick(last.t_us, self.traffic);
+            self.instrument.tick(last.t_us, self.traffic);
+            if self.picture_us.is_none_or(|picture_us| last.t_us.abs_diff(picture_us) >= PICTURE_US)
+            {
+                self.picture_us = Some(last.t_us);
+                self.take_picture();
             }
         }
     }
 
-    fn frame(&mut self, now_us: u64) {
-        self.instrument.tick(now_us, self.traffic);
+    fn take_picture(&mut self) {
         let mut picture = Picture::EMPTY;
         picture.take(self.tachometer.heat());
         self.instrument.show_picture(&picture);

@@ -307,6 +307,8 @@ impl Instrument {
     }
 }
 
+const _: () = assert!(size_of::<Instrument>() <= 7 * 1024, "RAM of the device");
+
 /// When the window of a reading ends.
 fn end_us(reading: &Reading) -> u64 {
     reading.t_us.saturating_add(u64::from(reading.window_us / 2))

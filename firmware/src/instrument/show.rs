@@ -6,8 +6,8 @@ use heapless::Vec;
 
 use super::tally::Rpm;
 use super::{
-    Beyond, Instrument, LastSpeed, Mode, Number, Row, Scene, Sensor, Shown, State, Statistics,
-    Unit, View, end_us, fresh_us,
+    Beyond, Instrument, LastSpeed, Mode, Number, Page, Row, Scene, Sensor, Shown, State,
+    Statistics, Unit, View, end_us, fresh_us,
 };
 
 /// A sensor without an event for this long is silent.
@@ -33,7 +33,7 @@ impl Instrument {
         };
         let time_us = self.latest.as_ref().zip(self.first_us);
         View {
-            page: self.page,
+            page: if failed { Page::Main } else { self.page },
             mode: self.mode,
             state,
             time_tenths: time_us.map(|(latest, first_us)| (latest.t_us - first_us) / 100_000),

@@ -400,7 +400,7 @@ fn a_clock_that_begins_anew_takes_nothing_along() {
 fn rates_are_of_the_last_moments_and_losses_are_never_rounded_away() {
     let mut it = instrument();
     it.tick(1_000_000, Traffic { events: 7, lost: 0 });
-    it.tick(1_100_000, Traffic { events: 900_007, lost: 0 });
+    it.tick(1_050_000, Traffic { events: 900_007, lost: 0 });
     assert_eq!(it.view().rate, Rate::default());
     it.tick(1_250_000, Traffic { events: 1_000_007, lost: 1 });
     assert_eq!(it.view().rate, Rate { events_per_s: 4_000_000, lost_permille: 1 });

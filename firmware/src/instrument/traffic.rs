@@ -5,7 +5,7 @@
 pub const SATURATION_EV_S: u32 = 1_500_000;
 
 /// Shortest time over which a rate is told, in microseconds.
-const RATE_US: u64 = 200_000;
+const RATE_US: u64 = 100_000;
 
 /// Counts since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -60,7 +60,7 @@ pub struct Statistics {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct View {
-    /// What fills the screen.
+    /// What fills the screen: a fault is shown on the main page.
     pub page: Page,
     /// Which value the big number shows.
     pub mode: Mode,

@@ -1,11 +1,10 @@
 //! Beside the large picture: state, speeds, and how many events arrive.
 
-use core::fmt::Write as _;
-
 use embedded_graphics::pixelcolor::Rgb565;
 use embedded_graphics::prelude::*;
 use heapless::String;
 
+use super::number;
 use super::text::{self, Align, Ink, MEDIUM, SMALL};
 use super::theme::{self, BACK, DIM, FAINT, TEXT, area};
 use crate::instrument::View;
@@ -33,19 +32,13 @@ pub fn draw<D: DrawTarget<Color = Rgb565>>(target: &mut D, view: &View) -> Resul
             Align::Left,
             ink,
         )?;
-        let mut words = String::<12>::new();
-        let colour = match row.speed {
-            Some(speed) => {
-                write!(words, "{}", speed.value).ok();
-                TEXT
-            }
-            None => {
-                words.push_str("–––").ok();
-                FAINT
-            }
-        };
-        let ink = Ink { colour, paper: BACK };
-        text::draw(target, &MEDIUM, &words, Point::new(RIGHT, baseline), Align::Right, ink)?;
+        let right = Point::new(RIGHT, baseline);
+        if let Some(speed) = row.speed {
+            number::write(target, &MEDIUM, right, speed.value, Ink { colour: TEXT, paper: BACK })?;
+        } else {
+            let ink = Ink { colour: FAINT, paper: BACK };
+            text::draw(target, &MEDIUM, "---", right, Align::Right, ink)?;
+        }
     }
     let mut words = String::<24>::new();
     super::strip::write_rate(&mut words, view.rate.events_per_s);

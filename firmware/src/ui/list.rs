@@ -6,9 +6,10 @@ use embedded_graphics::pixelcolor::Rgb565;
 use embedded_graphics::prelude::*;
 use heapless::String;
 
+use super::number;
 use super::text::{self, Align, Ink, SMALL};
 use super::theme::{self, BACK, BAD, DIM, FAINT, RAISED, TEXT, area};
-use crate::instrument::{Row, Shown, State, Statistics, View};
+use crate::instrument::{Row, State, Statistics, View};
 
 /// Left edge, top edge, and height of a row.
 pub const LEFT: i32 = 138;
@@ -64,7 +65,7 @@ fn draw_row<D: DrawTarget<Color = Rgb565>>(
         return text::draw(target, &SMALL, word, at(18), Align::Left, ink);
     };
     let colour = if row.beyond.is_some() { BAD } else { TEXT };
-    write_at(target, at(VALUE), speed, Ink { colour, paper })?;
+    number::write(target, &SMALL, at(VALUE), speed.value, Ink { colour, paper })?;
     let dim = Ink { colour: DIM, paper };
     if let Some(direction) = row.direction {
         theme::draw_sense(target, at(VALUE + 11) - Point::new(0, 5), 4, direction, DIM)?;
@@ -88,31 +89,11 @@ fn draw_statistics<D: DrawTarget<Color = Rgb565>>(
         let ink = Ink { colour: DIM, paper: BACK };
         text::draw(target, &SMALL, name, Point::new(LEFT, baseline), Align::Left, ink)?;
         if let Some(value) = value {
-            write_at(
-                target,
-                Point::new(LEFT + VALUE, baseline),
-                value,
-                Ink { colour: TEXT, paper: BACK },
-            )?;
+            let right = Point::new(LEFT + VALUE, baseline);
+            number::write(target, &SMALL, right, value.value, Ink { colour: TEXT, paper: BACK })?;
         }
     }
     Ok(())
-}
-
-/// A value that ends at `right`.
-fn write_at<D: DrawTarget<Color = Rgb565>>(
-    target: &mut D,
-    right: Point,
-    shown: Shown,
-    ink: Ink,
-) -> Result<(), D::Error> {
-    let mut digits = String::<12>::new();
-    write!(digits, "{}", shown.value).ok();
-    let (said, filled) = digits.split_at(digits.len().saturating_sub(shown.value.filled()));
-    let faint = Ink { colour: FAINT, ..ink };
-    text::draw(target, &SMALL, filled, right, Align::Right, faint)?;
-    let right = right - Point::new(text::width(&SMALL, filled), 0);
-    text::draw(target, &SMALL, said, right, Align::Right, ink)
 }
 
 /// The rotor whose row a finger is on.

@@ -7,9 +7,9 @@ use embedded_graphics::prelude::*;
 use evtach_core::Direction;
 use heapless::String;
 
-use super::text::{self, Align, HUGE, Ink, MEDIUM, SMALL, width};
+use super::text::{self, Align, Font, HUGE, Ink, MEDIUM, SMALL, width};
 use super::theme::{self, BACK, BAD, DIM, FAINT, TEXT, area};
-use crate::instrument::{Mode, State, View};
+use crate::instrument::{Mode, Number, State, View};
 
 /// Where the number ends.
 const RIGHT: i32 = 396;
@@ -34,7 +34,6 @@ fn alarmed(view: &View) -> bool {
 pub fn draw<D: DrawTarget<Color = Rgb565>>(target: &mut D, view: &View) -> Result<(), D::Error> {
     target.fill_solid(&area(0, 28, 480, 86), BACK)?;
     let end = Point::new(RIGHT, BASELINE);
-    let faint = Ink { colour: FAINT, paper: BACK };
     if let Some(speed) = view.speed {
         let old = view.mode == Mode::Live && view.state == State::Held;
         let colour = match () {
@@ -42,13 +41,9 @@ pub fn draw<D: DrawTarget<Color = Rgb565>>(target: &mut D, view: &View) -> Resul
             () if old => DIM,
             () => TEXT,
         };
-        let mut digits = String::<12>::new();
-        write!(digits, "{}", speed.value).ok();
-        let (said, filled) = digits.split_at(digits.len().saturating_sub(speed.value.filled()));
-        text::draw(target, &HUGE, filled, end, Align::Right, faint)?;
-        let end = end - Point::new(width(&HUGE, filled), 0);
-        text::draw(target, &HUGE, said, end, Align::Right, Ink { colour, paper: BACK })?;
+        write(target, &HUGE, end, speed.value, Ink { colour, paper: BACK })?;
     } else {
+        let faint = Ink { colour: FAINT, paper: BACK };
         text::draw(target, &HUGE, DASHES, end, Align::Right, faint)?;
     }
     let ink = Ink { colour: DIM, paper: BACK };
@@ -60,6 +55,23 @@ pub fn draw<D: DrawTarget<Color = Rgb565>>(target: &mut D, view: &View) -> Resul
         text::draw(target, &MEDIUM, theme::letter(id), at, Align::Left, ink)?;
     }
     Ok(())
+}
+
+/// A number that ends at `right`, the zeros that only hold a place faint.
+pub fn write<D: DrawTarget<Color = Rgb565>>(
+    target: &mut D,
+    font: &Font,
+    right: Point,
+    number: Number,
+    ink: Ink,
+) -> Result<(), D::Error> {
+    let mut digits = String::<12>::new();
+    write!(digits, "{number}").ok();
+    let (said, filled) = digits.split_at(digits.len().saturating_sub(number.filled()));
+    let faint = Ink { colour: FAINT, ..ink };
+    text::draw(target, font, filled, right, Align::Right, faint)?;
+    let right = right - Point::new(width(font, filled), 0);
+    text::draw(target, font, said, right, Align::Right, ink)
 }
 
 pub fn details_changed(a: &View, b: &View) -> bool {

@@ -70,7 +70,8 @@ fn is_port(path: &Path) -> bool {
     }
     #[cfg(not(unix))]
     {
-        !path.exists() || fs::metadata(path).is_err()
+        // COM3 is not a file.
+        fs::metadata(path).is_err()
     }
 }
 

@@ -1,0 +1,48 @@
+//! `evtach screen` and `evtach watch`, as far as they go without a terminal.
+
+use std::path::Path;
+
+use evtach_host::frame::Frame;
+use tempfile::TempDir;
+
+use super::{assert_refused_as_bad, evtach};
+
+fn demo() -> String {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../demo/fan.raw").display().to_string()
+}
+
+/// Draws the demo's screen, and says what was printed.
+fn screen(folder: &TempDir, name: &str, options: &[&str]) -> (Frame, String) {
+    let out = folder.path().join(name);
+    let path = out.display().to_string();
+    let demo = demo();
+    let run = evtach(&[&["screen", &demo, &path], options].concat(), b"");
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    (Frame::read_png(&out).expect("a picture of the screen"), run.stdout)
+}
+
+#[test]
+fn the_demos_screen_shows_its_speed_in_the_unit_asked_for() {
+    let folder = TempDir::new().expect("a folder");
+    let (rpm, said) = screen(&folder, "rpm.png", &[]);
+    assert!(said.contains("LOCKED 1180.3 ± "), "{said}");
+    let (again, _) = screen(&folder, "again.png", &[]);
+    assert!(rpm == again);
+    let (hertz, said) = screen(&folder, "hertz.png", &["--unit", "hz"]);
+    assert!(said.contains("LOCKED 19.67"), "{said}");
+    assert!(rpm != hertz);
+}
+
+#[test]
+fn before_the_first_window_there_is_no_speed() {
+    let folder = TempDir::new().expect("a folder");
+    let out = folder.path().join("early.png").display().to_string();
+    let run = evtach(&["screen", &demo(), &out, "--at", "0.05"], b"");
+    assert_eq!(run.code, Some(1), "{}", run.stderr);
+    assert!(run.stdout.contains("SEARCHING"), "{}", run.stdout);
+}
+
+#[test]
+fn a_pipe_is_told_what_serves_it_instead_of_watch() {
+    assert_refused_as_bad(&evtach(&["watch", &demo()], b""), "evtach measure --json");
+}
