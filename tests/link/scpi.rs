@@ -9,7 +9,7 @@ use evtach_core::{
 };
 use evtach_firmware::instrument::{Fault, Sensor, Unit};
 use evtach_firmware::record::{Decoder, Header};
-use evtach_firmware::scpi::{LINE_BYTES, Link, LogLine, READING_TIMEOUT_US, Statistics};
+use evtach_firmware::scpi::{ErrorCode, LINE_BYTES, Link, LogLine, READING_TIMEOUT_US, Statistics};
 use proptest::prelude::*;
 
 fn rotor(id: u8, rpm: f32) -> RotorReading {
@@ -345,6 +345,10 @@ fn headers_are_listed_and_in_the_manual() {
     assert!(list.lines().count() > 60);
     for header in list.lines() {
         assert!(manual.contains(&format!("`{header}")), "{header} is not in scpi.md");
+    }
+    for code in ErrorCode::ALL {
+        let row = format!("| {} | {} |", code.number(), code.text());
+        assert!(manual.contains(&row), "{row} is not in scpi.md");
     }
 }
 

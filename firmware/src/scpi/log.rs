@@ -81,7 +81,7 @@ struct Number(Option<f32>);
 impl fmt::Display for Number {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0.filter(|value| value.is_finite()) {
-            Some(value) => write!(f, "{value:?}"),
+            Some(value) => f.write_str(ryu::Buffer::new().format_finite(value)),
             None => f.write_str("null"),
         }
     }

@@ -107,8 +107,23 @@ proptest! {
     }
 
     #[test]
-    fn numbers_come_back(value in any::<f32>().prop_filter("finite", |value| value.is_finite())) {
-        let text = std::format!("{value:?} RPM");
-        prop_assert_eq!(only(&text), Ok(Parameter::Number(value, b"RPM")));
+    fn numbers_of_seven_digits_are_exact(digits in 0_u32..1 << 24, places in 0_u32..=10, up in any::<bool>()) {
+        let text = std::format!("{digits}E{}{places}", if up { "" } else { "-" });
+        let value: f32 = text.parse().expect("a number");
+        prop_assert_eq!(only(&text), Ok(Parameter::Number(value, b"")));
+        let trailing = std::format!("+{digits}.000000 RPM");
+        prop_assert_eq!(only(&trailing), Ok(Parameter::Number(digits as f32, b"RPM")));
+    }
+
+    #[test]
+    fn other_numbers_are_near(value in any::<f32>().prop_filter("finite", |value| value.is_normal() && value.abs() < 1e38)) {
+        for text in [std::format!("{value:?}"), std::format!("{value:.20}"), std::format!("{value:E}")] {
+            let Ok(Parameter::Number(found, b"")) = only(&text) else {
+                return Err(TestCaseError::fail(text));
+            };
+            // Twenty decimals leave nothing of the smallest.
+            let lost = if text.contains(['e', 'E']) { 0.0 } else { 1e-19 };
+            prop_assert!((found - value).abs() <= value.abs() * 5e-7 + lost, "{text}: {found:?}");
+        }
     }
 }

@@ -42,7 +42,9 @@ impl Response {
 
     /// Forgets all.
     pub fn clear(&mut self) {
-        *self = Self::new();
+        // Field by field: a new one would be built on the stack first.
+        self.bytes.clear();
+        (self.sent, self.overflowed, self.follows) = (0, false, false);
     }
 
     /// Whether something did not fit.
@@ -54,6 +56,10 @@ impl Response {
     /// Raw text.
     pub fn raw(&mut self, text: &str) {
         self.overflowed |= self.bytes.extend_from_slice(text.as_bytes()).is_err();
+    }
+
+    fn raw_byte(&mut self, byte: u8) {
+        self.overflowed |= self.bytes.push(byte).is_err();
     }
 
     fn separate(&mut self) {
@@ -73,11 +79,13 @@ impl Response {
     /// A number; 9.91E+37 where there is none.
     pub fn number(&mut self, value: Option<f32>) {
         match value.filter(|value| value.is_finite()) {
-            // SCPI's exponent is a capital letter.
-            Some(value) if value != 0.0 && !(1e-4..1e9).contains(&value.abs()) => {
-                self.plain(format_args!("{value:E}"));
+            Some(value) => {
+                self.separate();
+                for byte in ryu::Buffer::new().format_finite(value).bytes() {
+                    // SCPI's exponent is a capital letter.
+                    self.raw_byte(byte.to_ascii_uppercase());
+                }
             }
-            Some(value) => self.plain(format_args!("{value:?}")),
             None => self.plain(NOT_A_NUMBER),
         }
     }
@@ -89,8 +97,8 @@ impl Response {
         for character in text.chars() {
             match character {
                 '"' => self.raw("\"\""),
-                ' '..='~' => self.raw(character.encode_utf8(&mut [0; 4])),
-                _ => self.raw("?"),
+                ' '..='~' => self.raw_byte(character as u8),
+                _ => self.raw_byte(b'?'),
             }
         }
         self.raw("\"");

@@ -22,8 +22,6 @@ pub mod stb {
     pub const ERRORS: u8 = 1 << 2;
     /// An enabled questionable event.
     pub const QUESTIONABLE: u8 = 1 << 3;
-    /// An answer waits.
-    pub const MESSAGE: u8 = 1 << 4;
     /// An enabled standard event.
     pub const EVENT: u8 = 1 << 5;
     /// Any bit that `*SRE` enables.
@@ -156,18 +154,16 @@ impl Status {
         }
     }
 
-    /// The status byte, from the queues and the registers.
+    /// The status byte, from the error queue and the registers. Its bit for an answer that waits is never set: a line is
+    /// worked on only when the answer before has been handed out.
     #[must_use]
-    pub const fn byte(&self, errors: bool, message: bool) -> u8 {
+    pub const fn byte(&self, errors: bool) -> u8 {
         let mut byte = 0;
         if errors {
             byte |= stb::ERRORS;
         }
         if self.questionable.summary() {
             byte |= stb::QUESTIONABLE;
-        }
-        if message {
-            byte |= stb::MESSAGE;
         }
         if self.esr & self.ese != 0 {
             byte |= stb::EVENT;
@@ -209,15 +205,15 @@ mod tests {
     #[test]
     fn events_reach_the_status_byte_when_enabled() {
         let mut status = Status::power_on();
-        assert_eq!(status.byte(false, false), 0, "nothing is enabled");
+        assert_eq!(status.byte(false), 0, "nothing is enabled");
         status.ese = esr::POWER_ON;
         status.sre = stb::EVENT;
-        assert_eq!(status.byte(true, true), stb::ERRORS | stb::MESSAGE | stb::EVENT | stb::MASTER);
+        assert_eq!(status.byte(true), stb::ERRORS | stb::EVENT | stb::MASTER);
         status.questionable.update(questionable::SPEED);
-        assert_eq!(status.byte(false, false), stb::EVENT | stb::MASTER);
+        assert_eq!(status.byte(false), stb::EVENT | stb::MASTER);
         *status.questionable.mask(Mask::Enable) = questionable::SPEED;
-        assert_eq!(status.byte(false, false), stb::EVENT | stb::MASTER | stb::QUESTIONABLE);
+        assert_eq!(status.byte(false), stb::EVENT | stb::MASTER | stb::QUESTIONABLE);
         status.clear();
-        assert_eq!(status.byte(false, false), 0);
+        assert_eq!(status.byte(false), 0);
     }
 }

@@ -44,7 +44,7 @@ impl Session {
             // Bit 6 is the summary of the others and cannot enable itself.
             Common::Sre => self.status.sre = mask & !stb::MASTER,
             Common::SreQuery => out.plain(self.status.sre),
-            Common::StbQuery => out.plain(self.status.byte(!self.errors.is_empty(), false)),
+            Common::StbQuery => out.plain(self.status.byte(!self.errors.is_empty())),
             Common::TstQuery => {
                 let sensor = u8::from(device.sensor() == Sensor::Absent);
                 out.plain(sensor | u8::from(device.fault().is_some()) << 1);

@@ -23,7 +23,6 @@ const GENERATION: u8 = 1;
 const LOW: u8 = 1;
 const HIGH: u8 = 2;
 const MAX_BLADES: u8 = 32;
-const MAX_RPM: f32 = 1e6;
 const MAX_TRIM_PPM: f32 = 1000.0;
 
 /// Why a block is not taken.
@@ -84,7 +83,7 @@ pub fn decode(bytes: &[u8]) -> Result<Preferences, BlockError> {
         let rpm = f32::from_le_bytes(bytes);
         match flags & flag != 0 {
             false => Ok(None),
-            true if rpm > 0.0 && rpm <= MAX_RPM => Ok(Some(rpm)),
+            true if rpm > 0.0 && rpm.is_finite() => Ok(Some(rpm)),
             true => Err(range(byte)),
         }
     };

@@ -107,9 +107,10 @@ fn reason(status: Status) -> Option<&'static str> {
     status.reason().map(evtach_core::Reason::as_str)
 }
 
-/// Six significant digits more than f32 holds would be noise: as written by f32, read as f64.
+/// Digits beyond those of f32 would be noise: as written by f32, read as f64. Written as the device writes it, which
+/// settles a tie of the last digit.
 fn widen(value: f32) -> f64 {
-    format!("{value}").parse().unwrap_or(f64::from(value))
+    ryu::Buffer::new().format(value).parse().unwrap_or(f64::from(value))
 }
 
 impl RotorRow {

@@ -55,11 +55,10 @@ impl Source for Stream {
         events.extend(records.iter().map(|&record| self.decoder.decode(record)));
         let (taken, rest) = (records.len(), rest.len());
         self.left -= taken as u64;
-        let over = bytes.len() - taken * RECORD_BYTES;
         self.input.consume(taken * RECORD_BYTES);
         let offset = self.input.offset();
         if self.left == 0 {
-            if over > 0 {
+            if !self.input.peek(1)?.is_empty() {
                 side.notes.push(format!(
                     "the header counts no more events: what follows at byte {offset} is left out"
                 ));
