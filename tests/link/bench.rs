@@ -47,6 +47,8 @@ pub struct Bench {
     pub live: bool,
     pub selected: Option<u8>,
     pub preferences: Preferences,
+    /// Times that preferences were set.
+    pub saves: u32,
     pub view: View,
     pub fault: Option<(Fault, String)>,
     pub recorder: Option<Recorder<Ram>>,
@@ -68,6 +70,7 @@ impl Bench {
             live: true,
             selected: None,
             preferences: Preferences::default(),
+            saves: 0,
             view: View::default(),
             fault: None,
             recorder: (memory_bytes > 0).then(|| Recorder::new(ram)),
@@ -148,6 +151,7 @@ impl Device for Bench {
 
     fn set_preferences(&mut self, preferences: Preferences) {
         self.preferences = preferences;
+        self.saves += 1;
     }
 
     fn geometry(&self) -> Option<Geometry> {

@@ -369,6 +369,9 @@ fn reset_keeps_the_calibration() {
     session.ask("UNIT HZ;CORR:CLOC 7;:BLAD 3;:CALC:LIM:UPP 100;:CONF C;:SYST:LOG ON;*RST");
     assert_eq!(session.ask("UNIT?;CORR:CLOC?;:BLAD?;:CONF?"), "RPM;7.0;AUTO;\"SPEED\",AUTO\n");
     assert_eq!(session.ask("CALC:LIM:UPP:STAT?;:SYST:LOG?"), "0;0\n");
+    let saves = session.bench.saves;
+    session.ask("*RST;UNIT RPM;:CALC:LIM:CLE;:BLAD AUTO;:CORR:CLOC 7");
+    assert_eq!(session.bench.saves, saves, "what does not change wears no flash");
 }
 
 #[test]

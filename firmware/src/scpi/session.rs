@@ -158,7 +158,7 @@ impl Session {
             Command::LimitClear => {
                 parameters.end()?;
                 let alarm = Alarm { low_rpm: None, high_rpm: None };
-                device.set_preferences(Preferences { alarm, ..device.preferences() });
+                setting::change(device, Preferences { alarm, ..device.preferences() });
             }
             Command::Collected(collected) => {
                 parameters.end()?;

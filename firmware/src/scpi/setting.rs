@@ -77,10 +77,15 @@ pub fn set(
         }
     };
     parameters.end()?;
-    if new != old {
+    change(device, new);
+    Ok(())
+}
+
+/// Sets preferences that differ: a flash wears.
+pub fn change(device: &mut impl Device, new: Preferences) {
+    if new != device.preferences() {
         device.set_preferences(new);
     }
-    Ok(())
 }
 
 const fn limit(preferences: &Preferences, side: Side) -> Option<f32> {

@@ -6,6 +6,7 @@ use super::error::ScpiError;
 use super::parameter::Parameters;
 use super::response::Response;
 use super::session::{Block, BlockKind, Flow, Session};
+use super::setting;
 use super::status::{Register, esr, stb};
 use crate::instrument::{Fault, Preferences, Sensor};
 
@@ -56,7 +57,7 @@ impl Session {
     /// The instrument as from the factory, but for its calibration; no log, no recording.
     fn reset(&mut self, device: &mut impl Device) {
         let clock_trim_ppm = device.preferences().clock_trim_ppm;
-        device.set_preferences(Preferences { clock_trim_ppm, ..Preferences::default() });
+        setting::change(device, Preferences { clock_trim_ppm, ..Preferences::default() });
         device.set_view(View::default());
         device.go_live();
         device.select(None);

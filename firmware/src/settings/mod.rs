@@ -1,7 +1,7 @@
 //! The person's preferences, kept in flash.
 //!
 //! `sequential-storage` writes each version of the block behind the one before, checks it by CRC-32 and gives the last
-//! that is whole: a cut of power while writing leaves the old one. [`block`] says what is in it.
+//! that is whole: a cut of power while writing leaves the old one. `block.rs` says what is in it.
 
 mod block;
 mod memory;
