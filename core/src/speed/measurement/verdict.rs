@@ -21,7 +21,7 @@ const COARSE_PHASE: f32 = 0.05;
 const COARSE_PHASE_SIGMA: f32 = 0.03;
 const COARSE_SPREAD: f32 = 0.5;
 /// A coarse reading with a larger relative error is none, and what a hand shakes, in pixels.
-const MOST_COARSE_SIGMA: f32 = 0.015;
+const MOST_COARSE_SIGMA: f32 = 0.012;
 const SHAKE_PX: f32 = 3.0;
 /// Roll of a hand-held camera for each pixel of shift: tremor turns the camera by about one milliradian as
 /// it shifts the image by one pixel.
