@@ -56,7 +56,7 @@ const FRACTIONAL_PAIRS: u32 = 3;
 /// The lock of a rotor that is followed: the phase tells its speed, and these bear it out.
 const FOLLOWING_PAIRS: u32 = 3;
 /// Where there are more events than this for each pair, more pairs are registered, up to [`MAX_PAIRS`].
-const PAIR_EVENTS: usize = 1_536;
+const PAIR_EVENTS: usize = 1_024;
 /// Step of the refinement in symmetry periods (paper: eta x half an angle of symmetry, eta = 0.8).
 const REFINEMENT_PERIODS: f32 = 0.4;
 /// Baseline of the lock as a share of the window.
