@@ -9,6 +9,7 @@ pub mod math;
 pub mod reading;
 pub mod registration;
 pub mod rotors;
+pub mod settings;
 pub mod speed;
 pub mod store;
 pub mod tachometer;
@@ -16,5 +17,6 @@ pub mod tracker;
 
 pub use event::{Event, Geometry, GyroSample, Polarity};
 pub use reading::{Direction, Evidence, Frame, Reading, Reason, RotorReading, Speed, Status};
+pub use settings::{Ignored, Memory, Poll, Roi, Settings};
 pub use store::StoredEvent;
-pub use tachometer::{Ignored, Memory, Poll, Roi, Settings, Tachometer};
+pub use tachometer::Tachometer;

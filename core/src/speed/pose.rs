@@ -10,8 +10,11 @@
 //! Blocks one symmetry period apart see the same pixels (their place on the grid, their latency), so
 //! the trend gets an offset for each place in the period: what is fixed to the pixels cancels.
 
+mod blocks;
+mod template;
+
 use heapless::Vec;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use super::baseline::Estimate;
 use super::path::{Knot, Moving, Path};
@@ -21,11 +24,9 @@ use crate::limits::MAX_KNOTS;
 use crate::math::{TAU, Turn, TurnRate, sqrt};
 use crate::rotors::Disc;
 use crate::store::Window;
+use blocks::{BLOCK_SHARE, Block, LEAST_SHARE, WALK_PX, WALK_SINGLE_PX, Walk, correct};
+use template::{BANKS, RINGS, Template};
 
-/// Rings between centre and rim.
-const RINGS: usize = 32;
-/// Banks: a ring for each polarity.
-const BANKS: usize = 2 * RINGS;
 /// Events that a block should hold.
 const BLOCK_EVENTS: usize = 64;
 /// Shortest block: a hand trembles up to 12 Hz, a host shakes up to some 60 Hz.
@@ -34,21 +35,6 @@ const SHORTEST_BLOCK_US: f32 = 3_000.0;
 const MOST_IN_PERIOD: f32 = 12.0;
 /// Symmetry periods in the window from which on places in the period get offsets of their own.
 const FOLDED_PERIODS: usize = 3;
-/// Fewest events in a block that counts.
-const LEAST_IN_BLOCK: u32 = 16;
-/// Share of a block's events in step, over that of all, below which the block is not believed, and the least.
-const BLOCK_SHARE: f32 = 0.4;
-const LEAST_SHARE: f32 = 0.05;
-/// How far the axis is thought to be off the path, in pixels: keeps the shift of a block finite where its events lie to
-/// one side of the axis.
-const SHIFT_PRIOR_PX: f32 = 2.0;
-/// How far the path walks from knot to knot.
-const WALK_PX: f32 = 0.5;
-/// The same for a rotor with a single mark, whose shift and turn look alike.
-const WALK_SINGLE_PX: f32 = 0.05;
-const WALK_RAD: f32 = 0.02;
-/// Farthest that a knot is moved at once.
-const STRIDE_PX: f32 = 3.0;
 /// Highest angular harmonic.
 const MOST_HARMONIC: u32 = 96;
 /// A doubled harmonic must keep this share of the events in step that were so at first.
@@ -88,54 +74,6 @@ impl Schedule {
     /// For a rotor that was followed in the window before: a third of the events tell it as well.
     const KNOWN: Self =
         Self { second: 2, fine: 3, all: 6, last: 7, first_events: 1_536, share: 3, ..Self::NEW };
-}
-
-/// Template of a rotor: a harmonic by ring and polarity.
-#[derive(Clone, Copy, Debug)]
-struct Template {
-    sums: [(f32, f32); BANKS],
-    counts: [u16; BANKS],
-}
-
-impl Template {
-    const EMPTY: Self = Self { sums: [(0.0, 0.0); BANKS], counts: [0; BANKS] };
-
-    fn add(&mut self, bank: usize, (sin, cos): (f32, f32)) {
-        self.sums[bank].0 += cos;
-        self.sums[bank].1 += sin;
-        self.counts[bank] = self.counts[bank].saturating_add(1);
-    }
-
-    /// Share of events in step, 0 to 1, corrected for what chance gives.
-    fn coherence(&self) -> f32 {
-        let (mut in_step, mut total) = (0.0, 0.0);
-        for (sum, count) in self.sums.iter().zip(self.counts) {
-            let excess = sum.0 * sum.0 + sum.1 * sum.1 - f32::from(count);
-            in_step += sqrt(excess.max(0.0));
-            total += f32::from(count);
-        }
-        in_step / total.max(1.0)
-    }
-
-    /// Every bank's phase as (cosine, sine).
-    fn phases(&self) -> [(f32, f32); BANKS] {
-        self.sums.map(|(re, im)| {
-            let length = sqrt(re * re + im * im).max(f32::MIN_POSITIVE);
-            (re / length, im / length)
-        })
-    }
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Block {
-    /// Sums of the products of m, -l sin and l cos, with m the harmonic and l = m / r.
-    normal: [f32; 6],
-    right: Vector3<f32>,
-    /// The same, each event by how far through the block it lies.
-    later: Vector3<f32>,
-    in_step: f32,
-    time_us: f32,
-    count: u32,
 }
 
 /// The turn followed through the window.
@@ -310,7 +248,9 @@ impl Pose {
         }
         let (at_low, at_high) = (sums.low.coherence(), sums.high.coherence());
         if self.round > 1 {
-            self.correct(&sums.blocks);
+            let (step_px, coherence) = (self.walk_px, self.coherence);
+            let walk = Walk { step_px, coherence, harmonic: self.harmonic };
+            correct(&mut self.path, &sums.blocks, walk);
         }
         let worth = at_high > at_low
             || self.round > fine
@@ -405,58 +345,6 @@ impl Pose {
         }
     }
 
-    /// Moves the knots to where the blocks want them: least squares with a path that walks rather than jumps, a
-    /// tridiagonal system of 3 x 3 matrices, solved from end to end.
-    fn correct(&mut self, blocks: &[Block; MAX_KNOTS]) {
-        let blocks = &blocks[..self.path.blocks()];
-        let knots = self.path.knots_mut();
-        let scatter = 1.0 / (2.0 * self.coherence.max(LEAST_SHARE));
-        let (px, rad) = (scatter / (self.walk_px * self.walk_px), scatter / (WALK_RAD * WALK_RAD));
-        let stiff = Matrix3::from_diagonal(&Vector3::new(rad, px, px));
-        let step = |k: usize| -> Option<Vector3<f32>> {
-            let (a, b) = (knots.get(k)?, knots.get(k + 1)?);
-            Some(Vector3::new(b.turn_rad - a.turn_rad, b.x_px - a.x_px, b.y_px - a.y_px))
-        };
-        // Events are spread evenly within a block: a third of their weight goes to either knot, a sixth between.
-        let link = |block: &Block| block.weight() / 6.0 - stiff;
-        let mut inverses = Vec::<Matrix3<f32>, MAX_KNOTS>::new();
-        let mut sides = Vec::<Vector3<f32>, MAX_KNOTS>::new();
-        for k in 0..knots.len() {
-            let mut pivot = Matrix3::identity() * 1e-3;
-            let mut side = Vector3::zeros();
-            if let (Some(block), Some(step)) = (blocks.get(k), step(k)) {
-                pivot += block.weight() / 3.0 + stiff;
-                side += block.right - block.later + stiff * step;
-            }
-            let before = k
-                .checked_sub(1)
-                .and_then(|i| Some((blocks.get(i)?, step(i)?, inverses.get(i)?, sides.get(i)?)));
-            if let Some((block, step, inverse, before)) = before {
-                let link = link(block);
-                pivot += block.weight() / 3.0 + stiff - link * inverse * link;
-                side += block.later - stiff * step - link * (inverse * before);
-            }
-            let Some(inverse) = pivot.try_inverse() else { return };
-            inverses.push(inverse).ok();
-            sides.push(side).ok();
-        }
-        let reach_rad = 1.0 / self.harmonic as f32;
-        let within = |value: f32, reach: f32| value.max(-reach).min(reach);
-        let mut off = Vector3::zeros();
-        for (k, knot) in knots.iter_mut().enumerate().rev() {
-            let (Some(inverse), Some(side)) = (inverses.get(k), sides.get(k)) else { return };
-            off = inverse * blocks.get(k).map_or(*side, |block| side - link(block) * off);
-            if !off.iter().all(|value| value.is_finite()) {
-                return;
-            }
-            *knot = Knot {
-                x_px: knot.x_px + within(off[1], STRIDE_PX),
-                y_px: knot.y_px + within(off[2], STRIDE_PX),
-                turn_rad: knot.turn_rad + within(off[0], reach_rad),
-            };
-        }
-    }
-
     /// The trend of the turn through the blocks, and how the axis wanders; `None` when too few blocks tell.
     fn trend(&self, sums: &Sums) -> Option<Slope> {
         let count = self.path.blocks();
@@ -465,7 +353,7 @@ impl Pose {
         let half_us = 0.5 * self.window_us;
         let mut points = Vec::<Point, MAX_KNOTS>::new();
         for block in sums.blocks.iter().take(count) {
-            let t_us = block.time_us / (block.count as f32).max(1.0);
+            let t_us = block.middle_us();
             let (off_rad, weight) = block.turn_rad().unwrap_or_default();
             let y = self.path.at(t_us).turn_rad + off_rad;
             points.push(Point { u: t_us / half_us, y, weight }).ok();
@@ -503,55 +391,5 @@ impl Pose {
             before = Some(here);
         }
         sqrt(squares / f32::from(count.max(1)))
-    }
-}
-
-impl Block {
-    fn share(&self) -> f32 {
-        self.in_step / (self.count as f32).max(1.0)
-    }
-
-    const EMPTY: Self = Self {
-        normal: [0.0; 6],
-        right: Vector3::new(0.0, 0.0, 0.0),
-        later: Vector3::new(0.0, 0.0, 0.0),
-        in_step: 0.0,
-        time_us: 0.0,
-        count: 0,
-    };
-
-    /// Adds an event: its levers on phase by turn and shift, its phase off the template, and when it came.
-    fn add(&mut self, a: Vector3<f32>, (sin_psi, cos_psi): (f32, f32), (t_us, f): (f32, f32)) {
-        let products = [a.x * a.x, a.x * a.y, a.x * a.z, a.y * a.y, a.y * a.z, a.z * a.z];
-        self.normal.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
-        self.right += a * sin_psi;
-        self.later += a * (sin_psi * f);
-        self.in_step += cos_psi;
-        self.time_us += t_us;
-        self.count += 1;
-    }
-
-    fn normal(&self) -> Matrix3<f32> {
-        let [a, b, c, d, e, f] = self.normal;
-        Matrix3::new(a, b, c, b, d, e, c, e, f)
-    }
-
-    /// What the block knows about turn and shift.
-    fn weight(&self) -> Matrix3<f32> {
-        self.normal() * self.share()
-    }
-
-    /// Turn in radians by which the block as a whole is off, and its weight.
-    fn turn_rad(&self) -> Option<(f32, f32)> {
-        if self.count < LEAST_IN_BLOCK {
-            return None;
-        }
-        let share = self.share();
-        // Events scatter by about 1 / (2 share) in phase squared, which gives the prior its weight.
-        let prior = 1.0 / (2.0 * share * SHIFT_PRIOR_PX * SHIFT_PRIOR_PX);
-        let damped =
-            self.normal() * share + Matrix3::from_diagonal(&Vector3::new(0.0, prior, prior));
-        let off_rad = damped.cholesky()?.solve(&self.right)[0];
-        off_rad.is_finite().then_some((off_rad, self.count as f32))
     }
 }

@@ -4,8 +4,8 @@ mod json;
 mod summary;
 mod table;
 
+use evtach_core::Ignored;
 use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
-use evtach_core::tachometer::Ignored;
 use evtach_core::{Event, GyroSample, Memory, Poll, Reading, Settings, StoredEvent, Tachometer};
 
 pub use json::{Document, FileFacts, ReadingRow, RotorRow, letter};

@@ -1,0 +1,86 @@
+//! What the caller of the tachometer chooses, lends and gets back.
+
+use crate::event::Geometry;
+use crate::reading::Reading;
+use crate::store::StoredEvent;
+
+/// A rectangle of pixels; events outside are ignored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Roi {
+    /// Left edge in pixels.
+    pub x: u16,
+    /// Top edge in pixels.
+    pub y: u16,
+    /// Width in pixels.
+    pub width_px: u16,
+    /// Height in pixels.
+    pub height_px: u16,
+}
+
+impl Roi {
+    /// Whether the pixel lies inside.
+    #[must_use]
+    pub const fn contains(self, x: u16, y: u16) -> bool {
+        // A pixel left of the edge wraps to a large number.
+        x.wrapping_sub(self.x) < self.width_px && y.wrapping_sub(self.y) < self.height_px
+    }
+}
+
+/// What the person chose; everything has a default that needs no knowledge of the rotor.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Size of the sensor.
+    pub geometry: Geometry,
+    /// Part of the sensor to look at.
+    pub roi: Option<Roi>,
+    /// Blade count, when it is known; `None` finds it.
+    pub blades: Option<u8>,
+    /// Length of the window in microseconds; `None` adapts it to the rotor.
+    pub window_us: Option<u32>,
+    /// One standard deviation of the sensor clock's error, in ppm.
+    pub clock_sigma_ppm: f32,
+}
+
+impl Settings {
+    /// Settings that fit any rotor in front of a sensor of this size.
+    #[must_use]
+    pub const fn new(geometry: Geometry) -> Self {
+        Self { geometry, roi: None, blades: None, window_us: None, clock_sigma_ppm: 15.0 }
+    }
+}
+
+/// Memory lent by the caller: its sizes are the only difference between device and PC.
+#[derive(Debug)]
+pub struct Memory<'m> {
+    /// Event store; the device lends [`crate::limits::DEVICE_EVENTS`].
+    pub events: &'m mut [StoredEvent],
+    /// Heat map; the device lends [`crate::limits::DEVICE_HEAT_CELLS`].
+    pub heat: &'m mut [u16],
+    /// Weights of the heat map's cells: as many.
+    pub weights: &'m mut [u8],
+}
+
+/// What [`Tachometer::poll`] did.
+#[derive(Debug)]
+#[expect(clippy::large_enum_variant, reason = "no heap to box it on")]
+pub enum Poll {
+    /// Nothing to measure until more events arrive.
+    Idle,
+    /// The budget is used up; poll again.
+    Pending,
+    /// A window has been measured.
+    Ready(Reading),
+}
+
+/// Events that were not used, by cause, since the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Ignored {
+    /// Outside the sensor.
+    pub out_of_bounds: u64,
+    /// Outside the region of interest.
+    pub out_of_roi: u64,
+    /// Older than the event before, or from a future that no clock reaches.
+    pub out_of_order: u64,
+    /// Arrived while the store was full because a measurement had not ended.
+    pub overrun: u64,
+}

@@ -1,0 +1,118 @@
+//! Registration at ever longer baselines: refinement, lock, and the test that tells an alias.
+
+use super::super::baseline::{Pace, Pairs};
+use super::{COARSE_AGREEMENT, Measurement, Stage};
+use crate::reading::Reason;
+use crate::registration::Icp;
+use crate::store::Window;
+
+/// Slice pairs: refinement, lock, fractional-baseline test.
+pub(super) const REFINEMENT_PAIRS: u32 = 12;
+const LOCK_PAIRS: u32 = 8;
+const FRACTIONAL_PAIRS: u32 = 3;
+/// The lock of a rotor that is followed: the phase tells its speed, and these bear it out.
+const FOLLOWING_PAIRS: u32 = 3;
+/// Where there are more events than this for each pair, more pairs are registered, up to [`MAX_PAIRS`].
+const PAIR_EVENTS: usize = 1_024;
+/// Step of the refinement in symmetry periods (paper: eta x half an angle of symmetry, eta = 0.8).
+pub(super) const REFINEMENT_PERIODS: f32 = 0.4;
+/// Baseline of the lock as a share of the window.
+const LOCK_SHARE: f32 = 2.0 / 3.0;
+/// A step to m periods is safe while three standard errors stay below this share of a period.
+const SAFE_SLIP: f32 = 0.33;
+
+impl Measurement {
+    pub(super) fn pace(&self) -> Pace {
+        Pace {
+            disc: self.disc,
+            omega_rad_s: self.omega_rad_s,
+            parts: u32::from(self.parts.unwrap_or(1)).max(1),
+        }
+    }
+
+    pub(super) fn plan(&mut self, window: &Window<'_>, periods: f32, pairs: u32) {
+        let plan = Pairs::plan(self.pace(), periods, pairs, self.events, window.duration_us);
+        self.pairs = Some(plan);
+    }
+
+    /// As many pairs as so many events are worth.
+    pub(super) fn worth(&self, least: u32) -> u32 {
+        least.max((self.events / PAIR_EVENTS) as u32)
+    }
+
+    /// Advances the planned pairs; the finished set once all are registered.
+    pub(super) fn advance(&mut self, window: &Window<'_>, icp: &mut Icp) -> Option<Pairs> {
+        let pairs = self.pairs.as_mut()?;
+        if pairs.step(window, self.pose.path(), icp) { self.pairs.take() } else { None }
+    }
+
+    /// The paper's refinement: step extended to 0.8 of half an angle of symmetry.
+    pub(super) fn refinement(&mut self, window: &Window<'_>, icp: &mut Icp) {
+        let Some(pairs) = self.advance(window, icp) else { return };
+        let Some(refined) = pairs.median() else {
+            self.stage = Stage::Verdict;
+            return;
+        };
+        self.evidence.refined_rad_s = Some(refined.omega_rad_s);
+        self.evidence.refined_sigma_rad_s = Some(refined.sigma_rad_s);
+        if (refined.omega_rad_s - self.omega_rad_s).abs()
+            > COARSE_AGREEMENT * self.omega_rad_s.abs()
+        {
+            return self.refuse(Reason::Ambiguous);
+        }
+        self.plan(window, REFINEMENT_PERIODS, self.worth(REFINEMENT_PAIRS));
+        if let Some(pairs) = &mut self.pairs {
+            pairs.retarget(refined.omega_rad_s);
+        }
+        self.stage = Stage::Further;
+    }
+
+    /// The paper's further refinement, kept to show what it gains.
+    pub(super) fn further(&mut self, window: &Window<'_>, icp: &mut Icp) {
+        let Some(pairs) = self.advance(window, icp) else { return };
+        self.evidence.further_rad_s = pairs.median().map(|found| found.omega_rad_s);
+        self.plan_lock(window, self.omega_rad_s.abs() * 0.01);
+        self.stage = Stage::Lock;
+    }
+
+    /// Plans the lock at the longest baseline that cannot slip a period while the speed is known to `sigma_rad_s`.
+    pub(super) fn plan_lock(&mut self, window: &Window<'_>, sigma_rad_s: f32) {
+        let pace = self.pace();
+        let periods = window.duration_us as f32 / pace.period_us();
+        let safe = SAFE_SLIP * pace.omega_rad_s.abs() / (3.0 * sigma_rad_s);
+        let mut m = libm::floorf((LOCK_SHARE * periods).min(safe)).max(1.0);
+        // Where the parts differ, only a whole revolution brings back the same picture.
+        let parts = pace.parts as f32;
+        if !self.alike && m >= parts {
+            m = libm::floorf(m / parts) * parts;
+        }
+        let pairs = if self.follows { FOLLOWING_PAIRS } else { self.worth(LOCK_PAIRS) };
+        self.plan(window, m, pairs);
+    }
+
+    /// Long-baseline lock.
+    pub(super) fn lock(&mut self, window: &Window<'_>, icp: &mut Icp) {
+        let Some(pairs) = self.advance(window, icp) else { return };
+        let longest = pairs.periods();
+        if let Some(found) = pairs.mean() {
+            self.evidence.lock_rad_s = Some(found.omega_rad_s);
+            self.evidence.lock_sigma_rad_s = Some(found.sigma_rad_s);
+            self.omega_rad_s = found.omega_rad_s;
+            let sigma = found.sigma_rad_s.max(found.omega_rad_s.abs() * 1e-5);
+            self.plan_lock(window, sigma);
+            if self.pairs.as_ref().is_some_and(|next| next.periods() > 1.5 * longest) {
+                return;
+            }
+        }
+        let pairs = if self.follows { 1 } else { FRACTIONAL_PAIRS };
+        self.plan(window, (longest - 0.35).max(0.65), pairs);
+        self.stage = Stage::Fractional;
+    }
+
+    /// Fractional-baseline test: an alias fits at whole periods and nowhere between.
+    pub(super) fn fractional(&mut self, window: &Window<'_>, icp: &mut Icp) {
+        let Some(pairs) = self.advance(window, icp) else { return };
+        self.evidence.fractional_deviation = pairs.deviation();
+        self.stage = Stage::Verdict;
+    }
+}

@@ -1,0 +1,46 @@
+//! The rotor in its own frame: the phase of one angular harmonic on many narrow rings, for each polarity.
+
+use crate::math::sqrt;
+
+/// Rings between centre and rim.
+pub const RINGS: usize = 32;
+/// Banks: a ring for each polarity.
+pub const BANKS: usize = 2 * RINGS;
+
+/// Template of a rotor: a harmonic by ring and polarity.
+#[derive(Clone, Copy, Debug)]
+pub struct Template {
+    sums: [(f32, f32); BANKS],
+    counts: [u16; BANKS],
+}
+
+impl Template {
+    /// Nothing learnt.
+    pub const EMPTY: Self = Self { sums: [(0.0, 0.0); BANKS], counts: [0; BANKS] };
+
+    /// Adds an event by the (sine, cosine) of its phase.
+    pub fn add(&mut self, bank: usize, (sin, cos): (f32, f32)) {
+        self.sums[bank].0 += cos;
+        self.sums[bank].1 += sin;
+        self.counts[bank] = self.counts[bank].saturating_add(1);
+    }
+
+    /// Share of events in step, 0 to 1, corrected for what chance gives.
+    pub fn coherence(&self) -> f32 {
+        let (mut in_step, mut total) = (0.0, 0.0);
+        for (sum, count) in self.sums.iter().zip(self.counts) {
+            let excess = sum.0 * sum.0 + sum.1 * sum.1 - f32::from(count);
+            in_step += sqrt(excess.max(0.0));
+            total += f32::from(count);
+        }
+        in_step / total.max(1.0)
+    }
+
+    /// Every bank's phase as (cosine, sine).
+    pub fn phases(&self) -> [(f32, f32); BANKS] {
+        self.sums.map(|(re, im)| {
+            let length = sqrt(re * re + im * im).max(f32::MIN_POSITIVE);
+            (re / length, im / length)
+        })
+    }
+}
