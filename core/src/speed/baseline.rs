@@ -151,7 +151,8 @@ impl Pairs {
     }
 
     /// Baseline in seconds.
-    fn baseline_s(&self) -> f32 {
+    #[must_use]
+    pub fn baseline_s(&self) -> f32 {
         self.periods * self.pace.period_us() * 1e-6
     }
 

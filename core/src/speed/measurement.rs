@@ -120,6 +120,8 @@ pub struct Measurement {
     pairs: Option<Pairs>,
     estimate: Estimate,
     status: Status,
+    /// Longest baseline of the lock.
+    lock_baseline_s: f32,
     alpha_rad_s2: Option<f32>,
     drift_px_s: f32,
     roll_sigma_rad_s: f32,
@@ -151,6 +153,7 @@ impl Measurement {
             pairs: None,
             estimate: Estimate::default(),
             status: Status::Refused(Reason::Searching),
+            lock_baseline_s: 0.0,
             alpha_rad_s2: None,
             drift_px_s: 0.0,
             roll_sigma_rad_s: 0.0,
@@ -300,7 +303,8 @@ impl Measurement {
                 self.harmonic = parts;
             }
         }
-        self.alike = stated.blades.is_none() && symmetry.score >= ALIKE_SCORE;
+        self.alike =
+            self.parts == Some(1) || stated.blades.is_none() && symmetry.score >= ALIKE_SCORE;
         self.evidence.symmetry_score = Some(symmetry.score);
         let rpm = self.omega_rad_s.abs() * Speed::RPM_PER_RAD_S;
         let blades = f32::from(self.parts.unwrap_or(1));

@@ -111,6 +111,7 @@ pub struct Pose {
     window_us: f32,
     period_us: f32,
     harmonic: u32,
+    first_harmonic: u32,
     most_harmonic: u32,
     walk_px: f32,
     path: Path,
@@ -146,6 +147,7 @@ impl Pose {
             window_us: window_us as f32,
             period_us: TAU * 1e6 / (omega_rad_s.abs() * parts as f32),
             harmonic,
+            first_harmonic: harmonic,
             most_harmonic: MOST_HARMONIC,
             walk_px: if parts > 1 { WALK_PX } else { WALK_SINGLE_PX },
             path: Path::STILL,
@@ -237,8 +239,14 @@ impl Pose {
             return false;
         }
         self.segment = 0;
-        self.sift(sums);
         let Schedule { second, fine, all, last, .. } = self.schedule;
+        let at_low = sums.low.coherence();
+        let astray = at_low < SHARP_COHERENCE * self.first_coherence;
+        if self.round > fine && astray && self.harmonic > self.first_harmonic {
+            self.step_back();
+            return false;
+        }
+        self.sift(sums);
         if self.round > last {
             self.slope = self.trend(sums);
             let (x_px, y_px) = self.path.centre();
@@ -246,8 +254,8 @@ impl Pose {
             self.disc.y_px += y_px;
             return true;
         }
-        let (at_low, at_high) = (sums.low.coherence(), sums.high.coherence());
-        if self.round > 1 {
+        let at_high = sums.high.coherence();
+        if self.phases.is_some() {
             let (step_px, coherence) = (self.walk_px, self.coherence);
             let walk = Walk { step_px, coherence, harmonic: self.harmonic };
             correct(&mut self.path, &sums.blocks, walk);
@@ -270,6 +278,14 @@ impl Pose {
             self.divide(self.blocks());
         }
         false
+    }
+
+    /// The harmonic was raised too far: half of it, learnt anew, and no higher again.
+    const fn step_back(&mut self) {
+        self.harmonic /= 2;
+        self.most_harmonic = self.harmonic;
+        self.coherence = self.first_coherence;
+        self.phases = None;
     }
 
     /// Events that this round looks at, at most.

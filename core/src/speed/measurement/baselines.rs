@@ -95,6 +95,7 @@ impl Measurement {
         let Some(pairs) = self.advance(window, icp) else { return };
         let longest = pairs.periods();
         if let Some(found) = pairs.mean() {
+            self.lock_baseline_s = pairs.baseline_s();
             self.evidence.lock_rad_s = Some(found.omega_rad_s);
             self.evidence.lock_sigma_rad_s = Some(found.sigma_rad_s);
             self.omega_rad_s = found.omega_rad_s;

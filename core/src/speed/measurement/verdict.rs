@@ -23,6 +23,8 @@ const COARSE_SPREAD: f32 = 0.5;
 /// A coarse reading with a larger relative error is none, and what a hand shakes, in pixels.
 const MOST_COARSE_SIGMA: f32 = 0.012;
 const SHAKE_PX: f32 = 3.0;
+/// What shadows, flicker and folded slices may bias a registration by, in radians: a fifth of a pixel half-way to the rim.
+const BIAS_RAD: f32 = 5e-3;
 /// Roll of a hand-held camera for each pixel of shift: tremor turns the camera by about one milliradian as
 /// it shifts the image by one pixel.
 const ROLL_RAD_PER_PX: f32 = 1e-3;
@@ -35,7 +37,8 @@ impl Measurement {
         let witness = |omega: Option<f32>, sigma: Option<f32>| {
             Some(Estimate { omega_rad_s: omega?, sigma_rad_s: sigma? })
         };
-        let lock = witness(self.evidence.lock_rad_s, self.evidence.lock_sigma_rad_s);
+        let lock = witness(self.evidence.lock_rad_s, self.evidence.lock_sigma_rad_s)
+            .map(|lock| self.with_bias(lock));
         let phase = witness(self.evidence.phase_rad_s, self.evidence.phase_sigma_rad_s);
         let window_s = window.duration_us as f32 * 1e-6;
         if let (Some(lock), Some(phase)) = (lock, phase) {
@@ -77,6 +80,13 @@ impl Measurement {
         let own = self.estimate.sigma_rad_s;
         self.estimate.sigma_rad_s = sqrt(own * own + clock * clock);
         self.roll_sigma_rad_s = roll;
+    }
+
+    /// Adds to the lock's error what may bias all its registrations alike.
+    fn with_bias(&self, lock: Estimate) -> Estimate {
+        let bias = BIAS_RAD / self.lock_baseline_s.max(f32::MIN_POSITIVE);
+        let own = lock.sigma_rad_s;
+        Estimate { sigma_rad_s: sqrt(own * own + bias * bias), ..lock }
     }
 
     /// A coarse reading of a single mark is as good as its axis holds still: what the mark does and what the camera
