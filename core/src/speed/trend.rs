@@ -11,8 +11,8 @@ use crate::math::{ln, sqrt};
 pub const MOST_POINTS: usize = crate::limits::MAX_KNOTS;
 /// Highest degree.
 const MOST_DEGREE: usize = 16;
-/// A further degree must lower the logarithm of the likelihood by this half: between the criteria of Akaike (2) and, for the
-/// number of points here, Schwarz (4).
+/// A further degree must lower twice the negative logarithm of the likelihood by this: twice what Schwarz's criterion asks for
+/// the number of points here, because each degree multiplies the variance of the ends.
 const DEGREE_COST: f32 = 8.0;
 /// What is left of a polynomial beside those before, below which it says nothing new.
 const LEAST_REST: f32 = 1e-3;
