@@ -140,8 +140,8 @@ impl ReadingRow {
     #[must_use]
     pub fn new(reading: &Reading, first_us: u64) -> Self {
         Self {
-            t_s: reading.t_us.saturating_sub(first_us) as f64 * 1e-6,
-            window_s: f64::from(reading.window_us) * 1e-6,
+            t_s: reading.t_us.saturating_sub(first_us) as f64 / 1e6,
+            window_s: f64::from(reading.window_us) / 1e6,
             status: reading.status.as_str().into(),
             reason: reason(reading.status).map(Cow::from),
             rotors: reading.rotors.iter().map(RotorRow::new).collect(),
@@ -159,7 +159,7 @@ impl Document {
             format: facts.format.clone(),
             width_px: facts.size_px.0,
             height_px: facts.size_px.1,
-            duration_s: facts.last_us.saturating_sub(facts.first_us) as f64 * 1e-6,
+            duration_s: facts.last_us.saturating_sub(facts.first_us) as f64 / 1e6,
             events: facts.events,
             thinned: facts.thinned,
             lost: facts.lost,
