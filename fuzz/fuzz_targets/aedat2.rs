@@ -4,5 +4,5 @@
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
-    evtach_fuzz::read_behind(b"#!AER-DAT2.0\\r\\n", data);
+    evtach_fuzz::read_behind(b"#!AER-DAT2.0\r\n", data);
 });

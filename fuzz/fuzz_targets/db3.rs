@@ -4,5 +4,5 @@
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
-    evtach_fuzz::read_file(&[b"SQLite format 3\\0", data].concat());
+    evtach_fuzz::read_file(&[b"SQLite format 3\0", data].concat());
 });

@@ -4,5 +4,5 @@
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
-    evtach_fuzz::read_behind(b"% evt 2.0\\n% geometry 640x480\\n", data);
+    evtach_fuzz::read_behind(b"% evt 2.0\n% geometry 640x480\n", data);
 });

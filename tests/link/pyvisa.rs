@@ -5,49 +5,28 @@
 #[path = "bench.rs"]
 #[expect(dead_code, reason = "shared with other tests")]
 mod bench;
+#[path = "visa.rs"]
+mod visa;
 
 use std::fs::File;
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpListener;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::Child;
 use std::time::{Duration, Instant};
 
 use bench::Bench;
-use evtach_core::{Event, Geometry, Reading, Settings, Speed};
+use evtach_core::{Event, Geometry, Reading, Settings};
 use evtach_firmware::instrument::Sensor;
 use evtach_firmware::scpi::Link;
 use evtach_host::measure::{Capacity, measure_events};
-use evtach_host::recording::{self, OpenOptions};
 use evtach_host::synth::{self, Rotor, Scene};
 use rustix::fs::{OFlags, fcntl_setfl};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
+use visa::{check, out, python, session};
 
 /// Longest session that is not taken for a hang.
 const PATIENCE: Duration = Duration::from_secs(60);
-
-fn interop() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("interop")
-}
-
-/// Python with PyVISA, or `None` where it cannot be had.
-fn python() -> Option<String> {
-    let output = Command::new("bash").arg(interop().join("setup.sh")).arg("visa").output();
-    match output {
-        Ok(output) if output.status.success() => {
-            Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
-        }
-        Ok(output) => {
-            println!("skipped: no PyVISA ({})", String::from_utf8_lossy(&output.stderr).trim());
-            None
-        }
-        Err(error) => {
-            println!("skipped: no shell ({error})");
-            None
-        }
-    }
-}
 
 /// A device in front of a propeller at 1500 rpm, which it sees in real time, again and again.
 struct Player {
@@ -145,47 +124,6 @@ fn unless_late(result: std::io::Result<usize>) -> usize {
     })
 }
 
-/// Starts the session; what it prints is one JSON object.
-fn session(python: &str, port: &str, out: &Path) -> Child {
-    Command::new(python)
-        .arg(interop().join("pyvisa_session.py"))
-        .arg(port)
-        .arg(out)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the virtual environment's Python runs")
-}
-
-fn check(client: Child, out: &Path) {
-    let output = client.wait_with_output().expect("a child");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let found: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
-    let number = |name: &str| found[name].as_f64().expect("a number");
-    assert_eq!(found["identity"], "EV-Tach,EV-Tach,0,1.2.3");
-    assert_eq!((number("blades"), number("limit_hz")), (5.0, 30.0));
-    assert!((number("speed_hz") / 25.0 - 1.0).abs() < 0.01, "{found}");
-    assert!((number("speed_rpm") / 1500.0 - 1.0).abs() < 0.01, "{found}");
-    assert!(number("sigma_rpm") > 0.0 && number("sigma_rpm") < 15.0, "{found}");
-    assert_eq!((&found["direction"], number("alarm")), (&"CCW".into(), 0.0));
-    assert!(found["error"].as_str().is_some_and(|error| error.starts_with("-222,\"")), "{found}");
-    assert_eq!((number("events"), &found["no_error"]), (16.0, &"0,\"No error\"".into()));
-    assert!(found["log"]["rotors"][0]["rpm"].is_number(), "{found}");
-    assert_eq!(found["after"], "1");
-
-    let mut recording = recording::open(out, &OpenOptions::default()).expect("what was fetched");
-    let mut events = Vec::new();
-    while recording.read_chunk(&mut events).expect("an undamaged recording") {}
-    assert_eq!((recording.format, events.len()), ("EV8", 100_000));
-    assert_eq!(recording.side().notes, [""; 0]);
-    let settings = Settings::new(recording.geometry);
-    let (readings, _) = measure_events(&events, &[], settings, Capacity::Device);
-    let speeds = readings.iter().flat_map(|reading| &reading.rotors).filter_map(|r| r.speed);
-    let speeds: Vec<f32> = speeds.map(|s| s.omega_rad_s * Speed::RPM_PER_RAD_S).collect();
-    assert!(!speeds.is_empty(), "no speed in {} events", events.len());
-    assert!(speeds.iter().all(|rpm| (rpm / -1500.0 - 1.0).abs() < 0.01), "{speeds:?}");
-}
-
 /// The device's end, which does not wait; the name of the other; and the other held open, without which the first reads
 /// as broken.
 fn pseudo_terminal() -> (File, String, File) {
@@ -201,10 +139,6 @@ fn pseudo_terminal() -> (File, String, File) {
     (master.into(), name, slave)
 }
 
-fn out(name: &str) -> PathBuf {
-    std::env::temp_dir().join(format!("evtach-{name}-{}.ev8", std::process::id()))
-}
-
 #[test]
 fn over_a_serial_port_and_over_tcp() {
     let Some(python) = python() else { return };
@@ -214,7 +148,7 @@ fn over_a_serial_port_and_over_tcp() {
     let file = out("serial");
     let mut client = session(&python, &name, &file);
     player.serve(&mut master, &mut client);
-    check(client, &file);
+    check(client, &file, "1.2.3");
     std::fs::remove_file(&file).expect("the recording");
 
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
@@ -224,6 +158,6 @@ fn over_a_serial_port_and_over_tcp() {
     let (mut stream, _) = listener.accept().expect("the client connects");
     stream.set_nonblocking(true).expect("a socket");
     player.serve(&mut stream, &mut client);
-    check(client, &file);
+    check(client, &file, "1.2.3");
     std::fs::remove_file(&file).expect("the recording");
 }

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 pub use image::{Image, build};
 pub use output::{Acquired, CallCost, DeviceReading, MemoryUse, Output};
 pub use run::{Pace, qemu_present, run, run_screen, run_spi, write_recording};
-pub use session::{Session, Used, run_instrument};
+pub use session::{Plugged, Session, Used, run_instrument};
 
 /// Instructions in one tick of the board's 25 MHz timers, at QEMU's `-icount shift=0`.
 pub const INSTRUCTIONS_PER_TICK: u64 = 40;

@@ -27,7 +27,7 @@ const RECORDING: &str = "recording.ev8";
 pub(super) const STREAM: &str = "stream.spi";
 
 /// Bytes of the serial flash that QEMU has.
-const FLASH_BYTES: usize = 16 << 20;
+pub(super) const FLASH_BYTES: usize = 16 << 20;
 
 /// Whether QEMU is installed.
 #[must_use]

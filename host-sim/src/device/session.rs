@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 use super::image::root;
-use super::run::{STREAM, scratch};
+use super::run::{FLASH_BYTES, STREAM, scratch};
 use super::{DeviceError, Image};
 
 /// Instructions in one tick of the board's 25 MHz timers, at QEMU's `-icount shift=2`.
@@ -24,21 +24,91 @@ const ANSWER: Duration = Duration::from_secs(10);
 /// How long nothing comes when nothing more will.
 const QUIET: Duration = Duration::from_millis(500);
 
-/// A running instrument; it is switched off when this goes away.
+/// QEMU with the instrument in it; switched off when this goes away.
 #[derive(Debug)]
-pub struct Session {
-    qemu: Child,
-    port: BufReader<TcpStream>,
-    address: String,
-    // Holds what QEMU reads.
+struct Qemu {
+    process: Child,
+    // Holds what it reads.
     _folder: TempDir,
 }
 
-impl Drop for Session {
+impl Drop for Qemu {
     fn drop(&mut self) {
-        self.qemu.kill().ok();
-        self.qemu.wait().ok();
+        self.process.kill().ok();
+        self.process.wait().ok();
     }
+}
+
+impl Qemu {
+    /// Starts it at 250 million instructions a second, with its serial port led to `serial`, in QEMU's words.
+    fn start(
+        image: &Image,
+        stream: Option<&[u8]>,
+        words: &[&str],
+        serial: &str,
+        stdout: Stdio,
+    ) -> Result<Self, DeviceError> {
+        let folder = scratch()?;
+        let script = root().join("firmware/src/board/mps2_an500/qemu.sh");
+        let failed = |source| DeviceError::Start { program: script.display().to_string(), source };
+        let mut command = Command::new(fs::canonicalize(&script).map_err(failed)?);
+        command.arg(&image.path).arg("instrument").args(words);
+        if let Some(stream) = stream {
+            if stream.len() > FLASH_BYTES {
+                return Err(DeviceError::TooLongStream(stream.len()));
+            }
+            let path = folder.path().join(STREAM);
+            fs::write(&path, stream)
+                .map_err(|source| DeviceError::File { path: path.clone(), source })?;
+            command.env("EVTACH_FLASH", path);
+        }
+        command
+            .env("EVTACH_ICOUNT_SHIFT", "2")
+            .env("EVTACH_SERIAL", serial)
+            .stdout(stdout)
+            .stderr(Stdio::null());
+        Ok(Self { process: command.spawn().map_err(failed)?, _folder: folder })
+    }
+}
+
+/// A running instrument whose serial port is for another program to open; it is switched off when this goes away.
+#[derive(Debug)]
+pub struct Plugged {
+    _qemu: Qemu,
+    /// The port's name, such as `/dev/pts/4`.
+    pub port: String,
+}
+
+impl Plugged {
+    /// Switches it on, with this stream in the flash behind its SPI controller.
+    ///
+    /// # Errors
+    ///
+    /// When QEMU is missing, or does not say where the port is.
+    pub fn start(image: &Image, stream: &[u8]) -> Result<Self, DeviceError> {
+        let mut qemu = Qemu::start(image, Some(stream), &[], "pty", Stdio::piped())?;
+        let mut line = String::new();
+        if let Some(stdout) = qemu.process.stdout.take() {
+            let mut stdout = BufReader::new(stdout);
+            let failed =
+                |source| DeviceError::Start { program: "qemu-system-arm".to_owned(), source };
+            stdout.read_line(&mut line).map_err(failed)?;
+            // Left open, so that QEMU may write to it.
+            qemu.process.stdout = Some(stdout.into_inner());
+        }
+        // "char device redirected to /dev/pts/4 (label serial0)"
+        match line.split(' ').find(|word| word.starts_with('/')) {
+            Some(port) => Ok(Self { _qemu: qemu, port: port.to_owned() }),
+            None => Err(DeviceError::Line { line: 1, text: line }),
+        }
+    }
+}
+
+/// A running instrument, spoken to; it is switched off when this goes away.
+#[derive(Debug)]
+pub struct Session {
+    qemu: Qemu,
+    port: BufReader<TcpStream>,
 }
 
 impl Session {
@@ -47,7 +117,7 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// When QEMU is missing, or the port cannot be opened.
+    /// When QEMU is missing, the port cannot be opened, or the stream is larger than the flash.
     pub fn start(
         image: &Image,
         stream: Option<&[u8]>,
@@ -62,43 +132,13 @@ impl Session {
         words: &[&str],
         stdout: Stdio,
     ) -> Result<Self, DeviceError> {
-        let folder = scratch()?;
-        let script = root().join("firmware/src/board/mps2_an500/qemu.sh");
-        let failed = |source| DeviceError::Start { program: script.display().to_string(), source };
-        let mut command = Command::new(fs::canonicalize(&script).map_err(failed)?);
-        command.arg(&image.path).arg("instrument").args(words);
-        if let Some(stream) = stream {
-            let path = folder.path().join(STREAM);
-            fs::write(&path, stream)
-                .map_err(|source| DeviceError::File { path: path.clone(), source })?;
-            command.env("EVTACH_FLASH", path);
-        }
+        let failed = |source| DeviceError::Start { program: "qemu-system-arm".to_owned(), source };
         let free = TcpListener::bind("127.0.0.1:0").and_then(|free| free.local_addr());
         let address = free.map_err(failed)?.to_string();
-        command
-            .env("EVTACH_ICOUNT_SHIFT", "2")
-            .env("EVTACH_SERIAL", format!("tcp:{address},server=on,wait=on"))
-            .stdout(stdout)
-            .stderr(Stdio::null());
-        let mut qemu = command.spawn().map_err(failed)?;
-        match connect(&address) {
-            Ok(port) => Ok(Self { qemu, port: BufReader::new(port), address, _folder: folder }),
-            Err(source) => {
-                qemu.kill().ok();
-                qemu.wait().ok();
-                Err(failed(source))
-            }
-        }
-    }
-
-    /// Hangs up, so that another program may take the port at the address that is returned.
-    ///
-    /// # Errors
-    ///
-    /// When the port cannot be closed.
-    pub fn hang_up(&mut self) -> io::Result<&str> {
-        self.port.get_ref().shutdown(std::net::Shutdown::Both)?;
-        Ok(&self.address)
+        let serial = format!("tcp:{address},server=on,wait=on");
+        let qemu = Qemu::start(image, stream, words, &serial, stdout)?;
+        let port = connect(&address).map_err(failed)?;
+        Ok(Self { qemu, port: BufReader::new(port) })
     }
 
     /// Sends a line.
@@ -190,7 +230,7 @@ pub fn run_instrument(image: &Image, stream: &[u8], seconds: u32) -> Result<Used
     session.port.read_to_end(&mut told).ok();
     let told = String::from_utf8_lossy(&told);
     let mut said = String::new();
-    if let Some(stdout) = &mut session.qemu.stdout {
+    if let Some(stdout) = &mut session.qemu.process.stdout {
         stdout.read_to_string(&mut said).map_err(failed)?;
     }
     let mut used = Used { seconds, ..Used::default() };

@@ -159,7 +159,7 @@ impl Document {
             format: facts.format.clone(),
             width_px: facts.size_px.0,
             height_px: facts.size_px.1,
-            duration_s: facts.last_us.saturating_sub(facts.first_us) as f64 * 1e-6,
+            duration_s: facts.last_us.saturating_sub(facts.first_us) as f64 / 1e6,
             events: facts.events,
             thinned: facts.thinned,
             lost: facts.lost,
