@@ -118,7 +118,9 @@ impl Visits {
         }
         for (event, cell) in events() {
             let since_us = event.since(window.start_us).max(0) as u64;
-            let tick = ((since_us << TICKS_LOG2) / u64::from(self.window_us)) as u16;
+            // A last window may end before its last event.
+            let tick = (since_us << TICKS_LOG2) / u64::from(self.window_us);
+            let tick = tick.min((1 << TICKS_LOG2) - 1) as u16;
             let place = &mut self.ends[cell];
             if let Some(time) = self.times.get_mut(usize::from(*place)) {
                 *time = (tick << 1) | u16::from(event.is_on());
@@ -163,7 +165,8 @@ impl Visits {
             let weight = weights[usize::from(late & 1)];
             for early in kept().take(index) {
                 if (late ^ early) & 1 == 0 {
-                    let lag = usize::from(late - early) >> (TICKS_LOG2 + 1 - LAGS.ilog2());
+                    let lag =
+                        usize::from(late.saturating_sub(early)) >> (TICKS_LOG2 + 1 - LAGS.ilog2());
                     if let Some(sum) = lags.get_mut(lag) {
                         *sum += weight;
                     }
