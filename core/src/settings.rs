@@ -60,7 +60,7 @@ pub struct Memory<'m> {
     pub weights: &'m mut [u8],
 }
 
-/// What [`Tachometer::poll`] did.
+/// What [`crate::Tachometer::poll`] did.
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "no heap to box it on")]
 pub enum Poll {
