@@ -36,6 +36,9 @@ const MOST_BLUR: (f32, f32) = (0.1, 1.5);
 const LEAST_BLUR: (f32, f32) = (0.06, 1.3);
 /// What the jitter of the events in dim light may add to it.
 const MOST_JITTER_S: f32 = 150e-6;
+/// In dimmer light a fast rotor's edges are smeared further, but still sharper than its blades are apart by this share:
+/// what only looks like a rotor from a place beside it does not keep step at twice the harmonic.
+const MOST_SMEAR: f32 = 0.8;
 /// Two harmonics of one line differ by a fifteenth or more.
 const SCAN_AGREEMENT: f32 = 0.04;
 /// Fewest events of a rotor that are measured.
@@ -344,7 +347,7 @@ impl Measurement {
                 self.alpha_rad_s2 = Some(found.alpha_rad_s2);
             }
         }
-        if !self.sharp(MOST_BLUR) {
+        if !self.sharp(MOST_BLUR) && self.pose.smear() > MOST_SMEAR {
             return self.refuse(Reason::Ambiguous);
         }
         if !self.follows {

@@ -197,6 +197,13 @@ impl Pose {
         0.5 * self.disc.radius_px / (self.harmonic as f32 * self.coherence.max(LEAST_SHARE))
     }
 
+    /// The same as a share of what it would be if all events kept step at the harmonic that the rotor was found by, and
+    /// at none above.
+    #[must_use]
+    pub fn smear(&self) -> f32 {
+        self.first_harmonic as f32 / (self.harmonic as f32 * self.coherence.max(LEAST_SHARE))
+    }
+
     /// Rotor's events in the window.
     #[must_use]
     pub const fn events(&self) -> usize {
