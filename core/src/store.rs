@@ -26,10 +26,10 @@ pub struct StoredEvent {
     y_weight_polarity: u16,
 }
 
-/// Eighths of a segment that keep consecutive events.
-const DENSE_EIGHTHS: usize = 2;
-/// Eighths before the reservoir starts.
-const BURST_EIGHTHS: usize = 5;
+/// Sixteenths of a segment that keep consecutive events.
+const DENSE_SIXTEENTHS: usize = 4;
+/// Sixteenths before the reservoir starts.
+const BURST_SIXTEENTHS: usize = 7;
 
 const POLARITY_BIT: u16 = 0x8000;
 /// Rows fit 11 bits ([`crate::Geometry::MAX_PX`]); the four above hold the weight.
@@ -101,7 +101,7 @@ struct Segment {
 impl Default for Segment {
     fn default() -> Self {
         // Where the octaves end, the reservoir goes on as densely as the last of them.
-        let stride_log2 = (BURST_EIGHTHS - DENSE_EIGHTHS) as u8;
+        let stride_log2 = (BURST_SIXTEENTHS - DENSE_SIXTEENTHS) as u8;
         Self {
             len: 0,
             counted: 0,
@@ -201,8 +201,8 @@ impl<'m> Store<'m> {
             return;
         }
         let base = slot * self.capacity;
-        let octave = self.capacity / 8;
-        let burst = BURST_EIGHTHS * octave;
+        let octave = self.capacity / 16;
+        let burst = BURST_SIXTEENTHS * octave;
         if segment.len == self.capacity {
             // Halve the reservoir: every other event goes, those kept stay evenly spread.
             let reservoir = &mut self.events[base + burst..base + self.capacity];
@@ -215,8 +215,8 @@ impl<'m> Store<'m> {
             }
         }
         let stride_log2 = match segment.len.checked_div(octave).unwrap_or(0) {
-            0..DENSE_EIGHTHS => 0,
-            eighth if eighth < BURST_EIGHTHS => (eighth - DENSE_EIGHTHS + 1) as u8,
+            0..DENSE_SIXTEENTHS => 0,
+            sixteenth if sixteenth < BURST_SIXTEENTHS => (sixteenth - DENSE_SIXTEENTHS + 1) as u8,
             _ => segment.stride_log2,
         };
         if let Some(place) = self.events.get_mut(base + segment.len) {
@@ -327,7 +327,7 @@ impl<'m> Store<'m> {
 
     /// Events of a segment that come before its reservoir.
     const fn burst(&self) -> usize {
-        BURST_EIGHTHS * (self.capacity / 8)
+        BURST_SIXTEENTHS * (self.capacity / 16)
     }
 
     /// Takes in the camera's roll rate, positive = the scene turns clockwise on the screen.
