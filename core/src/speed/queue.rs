@@ -86,7 +86,9 @@ mod tests {
 
     /// Exponentially distributed with a mean of one, from a hash.
     fn random(index: u64) -> f32 {
-        let hash = (index + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40;
+        let mixed = (index + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        let mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let hash = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB) >> 40;
         -libm::logf((hash as f32 + 0.5) / (1 << 24) as f32)
     }
 
