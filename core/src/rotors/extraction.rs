@@ -25,7 +25,9 @@ use super::sweep::sweep;
 use super::visits::Visits;
 use super::winding::Explainer;
 use crate::event::Geometry;
-use crate::limits::{COHERENCE_CELLS, MAX_CANDIDATES, MAX_CLUSTERS, MAX_LINES, MAX_ROTORS};
+use crate::limits::{
+    COHERENCE_CELLS, MAX_CANDIDATES, MAX_CLUSTERS, MAX_LINES, MAX_ROTORS, VISIT_CELLS, VISITS,
+};
 use crate::math::{TAU, sqrt};
 use crate::speed::polar::{PolarTrack, track};
 use crate::store::{StoredEvent, Window};
@@ -108,6 +110,9 @@ pub struct Extraction {
     best: Vec<Cluster, MAX_CLUSTERS>,
     /// Quarter of the picture that is searched, from 1 on; 0 = all of it.
     quarter: usize,
+    /// Smallest cells worth trying in a quarter, as a power of two: those that did for the whole, or half as wide where there
+    /// were more events than memory.
+    least_log2: u8,
     /// Cells of the visits: as fine as the events allow.
     grid: CellGrid,
     /// Grid of the local map at hand.
@@ -213,6 +218,10 @@ impl Extraction {
             self.grid = self.grid.coarser();
             return;
         }
+        if self.quarter == 0 {
+            let capped = events > VISITS / 4 * 3;
+            self.least_log2 = self.grid.cell_log2.saturating_sub(u8::from(capped)).max(2);
+        }
         spectrum.clear();
         self.stage = Stage::Lags;
     }
@@ -232,10 +241,11 @@ impl Extraction {
         let half = |cells: usize| ((cells << cell_log2) / 2) as u16;
         let (width_px, height_px) = (half(columns), half(rows));
         let (column, row) = (number % QUARTERS_A_SIDE, number / QUARTERS_A_SIDE);
+        let geometry = Geometry { width_px, height_px };
         CellGrid {
             x0: width_px / 2 * column as u16,
             y0: height_px / 2 * row as u16,
-            ..Visits::grid(Geometry { width_px, height_px }, view.weights.len())
+            ..CellGrid::fit(geometry, self.least_log2, view.weights.len().min(VISIT_CELLS))
         }
     }
 
