@@ -1,0 +1,67 @@
+//! One stored event.
+
+use crate::event::{Event, Polarity};
+
+/// One event as the store keeps it, 8 bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StoredEvent {
+    /// Low 32 bits of the sensor time in microseconds: differences within a window are exact.
+    t_us: u32,
+    x: u16,
+    /// Row, weight and polarity.
+    y_weight_polarity: u16,
+}
+
+const POLARITY_BIT: u16 = 0x8000;
+/// Rows fit 11 bits ([`crate::Geometry::MAX_PX`]); the four above hold the weight.
+const ROW_BITS: u16 = 11;
+const ROW_MASK: u16 = (1 << ROW_BITS) - 1;
+const WEIGHT_MASK: u16 = 0xF << ROW_BITS;
+pub(super) const MOST_WEIGHT_LOG2: u8 = 15;
+
+impl StoredEvent {
+    pub(super) fn pack(event: &Event, weight_log2: u8) -> Self {
+        let polarity = if event.polarity == Polarity::On { POLARITY_BIT } else { 0 };
+        let packed = Self {
+            t_us: event.t_us as u32,
+            x: event.x,
+            y_weight_polarity: (event.y & ROW_MASK) | polarity,
+        };
+        packed.weighing(weight_log2)
+    }
+
+    pub(super) fn weighing(self, weight_log2: u8) -> Self {
+        let weight = u16::from(weight_log2.min(MOST_WEIGHT_LOG2)) << ROW_BITS;
+        Self { y_weight_polarity: (self.y_weight_polarity & !WEIGHT_MASK) | weight, ..self }
+    }
+
+    /// How many events this one stands for, as a power of two: the others were thinned.
+    #[must_use]
+    pub const fn weight_log2(self) -> u8 {
+        ((self.y_weight_polarity & WEIGHT_MASK) >> ROW_BITS) as u8
+    }
+
+    /// Column in pixels.
+    #[must_use]
+    pub const fn x(self) -> u16 {
+        self.x
+    }
+
+    /// Row in pixels.
+    #[must_use]
+    pub const fn y(self) -> u16 {
+        self.y_weight_polarity & ROW_MASK
+    }
+
+    /// Whether the pixel became brighter.
+    #[must_use]
+    pub const fn is_on(self) -> bool {
+        self.y_weight_polarity & POLARITY_BIT != 0
+    }
+
+    /// Time since `origin_us` in microseconds.
+    #[must_use]
+    pub const fn since(self, origin_us: u64) -> i32 {
+        self.t_us.wrapping_sub(origin_us as u32) as i32
+    }
+}
