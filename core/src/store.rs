@@ -24,10 +24,10 @@ pub const SPARE_SEGMENTS: usize = 2;
 /// Segments in the ring.
 pub const SEGMENTS: usize = WINDOW_SEGMENTS + SPARE_SEGMENTS;
 
-/// Eighths of a segment that keep consecutive events.
-const DENSE_EIGHTHS: usize = 2;
-/// Eighths before the reservoir starts.
-const BURST_EIGHTHS: usize = 5;
+/// Sixteenths of a segment that keep consecutive events.
+const DENSE_SIXTEENTHS: usize = 4;
+/// Sixteenths before the reservoir starts.
+const BURST_SIXTEENTHS: usize = 7;
 
 #[derive(Clone, Copy, Debug)]
 struct Segment {
@@ -45,7 +45,7 @@ struct Segment {
 impl Default for Segment {
     fn default() -> Self {
         // Where the octaves end, the reservoir goes on as densely as the last of them.
-        let stride_log2 = (BURST_EIGHTHS - DENSE_EIGHTHS) as u8;
+        let stride_log2 = (BURST_SIXTEENTHS - DENSE_SIXTEENTHS) as u8;
         Self {
             len: 0,
             counted: 0,
@@ -62,7 +62,7 @@ impl Default for Segment {
 #[derive(Debug)]
 pub struct Store<'m> {
     events: &'m mut [StoredEvent],
-    /// Events in one segment: 2/8 dense, 3/8 in octaves, 3/8 reservoir.
+    /// Events in one segment: 4/16 dense, 3/16 in octaves, 9/16 reservoir.
     capacity: usize,
     segments: [Segment; SEGMENTS],
     /// Ring position of the oldest segment.
@@ -145,8 +145,8 @@ impl<'m> Store<'m> {
             return;
         }
         let base = slot * self.capacity;
-        let octave = self.capacity / 8;
-        let burst = BURST_EIGHTHS * octave;
+        let octave = self.capacity / 16;
+        let burst = BURST_SIXTEENTHS * octave;
         if segment.len == self.capacity {
             // Halve the reservoir: every other event goes, those kept stay evenly spread.
             let reservoir = &mut self.events[base + burst..base + self.capacity];
@@ -159,8 +159,8 @@ impl<'m> Store<'m> {
             }
         }
         let stride_log2 = match segment.len.checked_div(octave).unwrap_or(0) {
-            0..DENSE_EIGHTHS => 0,
-            eighth if eighth < BURST_EIGHTHS => (eighth - DENSE_EIGHTHS + 1) as u8,
+            0..DENSE_SIXTEENTHS => 0,
+            part if part < BURST_SIXTEENTHS => (part - DENSE_SIXTEENTHS + 1) as u8,
             _ => segment.stride_log2,
         };
         if let Some(place) = self.events.get_mut(base + segment.len) {
@@ -178,7 +178,7 @@ impl<'m> Store<'m> {
 
     /// Events of a segment that come before its reservoir.
     const fn burst(&self) -> usize {
-        BURST_EIGHTHS * (self.capacity / 8)
+        BURST_SIXTEENTHS * (self.capacity / 16)
     }
 
     /// Takes in the camera's roll rate, positive = the scene turns clockwise on the screen.
