@@ -3,13 +3,10 @@
 use super::grid::{Grid, Metric};
 use super::rigid::{PointToHelicoid, PointToPoint, Rigid};
 use super::slice::{Slice, SlicePoint};
-use crate::math::sqrt;
+use crate::math::{quick_sqrt, sqrt};
 
 /// Iterations in one direction.
 const MOST_ITERATIONS: u8 = 10;
-/// Registration ends when an iteration turns by less than this. Absolute: the paper's ratio to the accumulated
-/// yaw stops early at large angles (a bias of up to 0.8 permille) and never at small ones.
-const SETTLED_RAD: f32 = 1e-4;
 /// Fewest matches that determine a yaw.
 const LEAST_MATCHES: usize = 12;
 /// Matches farther than this in pixels are not used.
@@ -54,9 +51,9 @@ pub struct Icp {
 /// A registration in progress.
 #[derive(Clone, Copy, Debug)]
 struct Run {
-    start_rad: f32,
     radius_px: f32,
     residual: Residual,
+    settled_rad: f32,
     /// Result of the first half, the first slice onto the second; then the second half runs.
     there: Option<Registered>,
     rigid: Rigid,
@@ -77,9 +74,9 @@ pub enum Progress {
 
 impl Run {
     const EMPTY: Self = Self {
-        start_rad: 0.0,
         radius_px: 0.0,
         residual: Residual::FixedAxis,
+        settled_rad: 0.0,
         there: None,
         rigid: Rigid::IDENTITY,
         yaw_rad: 0.0,
@@ -96,9 +93,11 @@ impl Icp {
     /// Starts to register [`Icp::first`] onto [`Icp::second`] and back: the average of both ways cancels the bias of
     /// matching a sparse slice to a dense one.
     ///
-    /// `start_rad` is the yaw to start from, `radius_px` the rotor's radius.
-    pub fn start(&mut self, start_rad: f32, radius_px: f32, residual: Residual) {
-        self.run = Run { start_rad, radius_px, residual, ..Run::EMPTY };
+    /// `start_rad` is the yaw to start from, `radius_px` the rotor's radius. A way ends when an iteration turns by less
+    /// than `settled_rad`. Absolute: the paper's ratio to the accumulated yaw stops early at large angles (a bias of
+    /// up to 0.8 permille) and never at small ones.
+    pub fn start(&mut self, start_rad: f32, radius_px: f32, residual: Residual, settled_rad: f32) {
+        self.run = Run { radius_px, residual, settled_rad, ..Run::EMPTY };
         self.start_half(start_rad);
     }
 
@@ -111,7 +110,7 @@ impl Icp {
         self.run.iterations = 0;
     }
 
-    /// One iteration. Cost: about 300 instructions a point; 10 to 20 iterations in all.
+    /// One iteration. Cost: about 300 instructions a point; 5 to 15 iterations in all.
     pub fn step(&mut self) -> Progress {
         let back = self.run.there.is_some();
         let (source, target) =
@@ -120,13 +119,14 @@ impl Icp {
             return Progress::Done(None);
         };
         self.run.iterations += 1;
-        if turn_rad.abs() >= SETTLED_RAD && self.run.iterations < MOST_ITERATIONS {
+        if turn_rad.abs() >= self.run.settled_rad && self.run.iterations < MOST_ITERATIONS {
             return Progress::Running;
         }
         let here = Registered { yaw_rad: self.run.yaw_rad, matched };
         let Some(there) = self.run.there else {
             self.run.there = Some(here);
-            self.start_half(-self.run.start_rad);
+            // From where the way there ended: few iterations are left, and stopping short there is made up for.
+            self.start_half(-here.yaw_rad);
             return Progress::Running;
         };
         Progress::Done(Some(Registered {
@@ -148,7 +148,7 @@ fn iterate(
         // Twice the mean speed of the points: flat optimum between one and four times.
         Residual::Helicoid { omega_rad_s } => 1.4 * run.radius_px * omega_rad_s.abs(),
     };
-    let metric = Metric { lambda_px_per_s, reach_px: REACH_PX, same_polarity: true };
+    let metric = Metric { lambda_px_per_s, reach_px: REACH_PX };
     let mut point = PointToPoint::default();
     let mut helicoid = PointToHelicoid::default();
     let (mut matches, mut found, mut squares) = (0, 0, 0.0_f32);
@@ -167,7 +167,7 @@ fn iterate(
                 }
             }
             Residual::Helicoid { omega_rad_s } => {
-                let r = sqrt(x_px * x_px + y_px * y_px).max(1.0);
+                let r = quick_sqrt(x_px * x_px + y_px * y_px).max(1.0);
                 let u = (-y_px / r, x_px / r);
                 let along = (to.x_px - x_px) * u.0 + (to.y_px - y_px) * u.1
                     - r * omega_rad_s * (to.tau_s - from.tau_s);
