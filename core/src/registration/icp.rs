@@ -7,6 +7,11 @@ use crate::math::{quick_sqrt, sqrt};
 
 /// Iterations in one direction.
 const MOST_ITERATIONS: u8 = 10;
+/// A way ends when an iteration turns by less than this. Absolute: the paper's ratio to the accumulated yaw stops early
+/// at large angles (a bias of up to 0.8 permille) and never at small ones.
+const SETTLED_RAD: f32 = 1e-4;
+/// Points lie at seven tenths of the radius on average.
+const MEAN_RADIUS: f32 = 0.7;
 /// Fewest matches that determine a yaw.
 const LEAST_MATCHES: usize = 12;
 /// Matches farther than this in pixels are not used.
@@ -53,7 +58,7 @@ pub struct Icp {
 struct Run {
     radius_px: f32,
     residual: Residual,
-    settled_rad: f32,
+    settled: f32,
     /// Result of the first half, the first slice onto the second; then the second half runs.
     there: Option<Registered>,
     rigid: Rigid,
@@ -76,7 +81,7 @@ impl Run {
     const EMPTY: Self = Self {
         radius_px: 0.0,
         residual: Residual::FixedAxis,
-        settled_rad: 0.0,
+        settled: 0.0,
         there: None,
         rigid: Rigid::IDENTITY,
         yaw_rad: 0.0,
@@ -93,17 +98,22 @@ impl Icp {
     /// Starts to register [`Icp::first`] onto [`Icp::second`] and back: the average of both ways cancels the bias of
     /// matching a sparse slice to a dense one.
     ///
-    /// `start_rad` is the yaw to start from, `radius_px` the rotor's radius. A way ends when an iteration turns by less
-    /// than `settled_rad`. Absolute: the paper's ratio to the accumulated yaw stops early at large angles (a bias of
-    /// up to 0.8 permille) and never at small ones.
-    pub fn start(&mut self, start_rad: f32, radius_px: f32, residual: Residual, settled_rad: f32) {
-        self.run = Run { radius_px, residual, settled_rad, ..Run::EMPTY };
+    /// `start_rad` is the yaw to start from, `radius_px` the rotor's radius. A way also ends when an iteration turns by
+    /// less than `settled` of what the scatter of the matches leaves the yaw uncertain by.
+    pub fn start(&mut self, start_rad: f32, radius_px: f32, residual: Residual, settled: f32) {
+        self.run = Run { radius_px, residual, settled, ..Run::EMPTY };
         self.start_half(start_rad);
     }
 
     fn start_half(&mut self, yaw_rad: f32) {
         let target = if self.run.there.is_none() { &self.second } else { &self.first };
-        self.grid.build(target, REACH_RADII * self.run.radius_px);
+        let lambda_px_per_s = match self.run.residual {
+            Residual::FixedAxis => 0.0,
+            // Twice the mean speed of the points: flat optimum between one and four times.
+            Residual::Helicoid { omega_rad_s } => 1.4 * self.run.radius_px * omega_rad_s.abs(),
+        };
+        let metric = Metric { lambda_px_per_s, reach_px: REACH_PX };
+        self.grid.build(target, REACH_RADII * self.run.radius_px, metric);
         self.run.rigid = Rigid::yaw(yaw_rad);
         self.run.yaw_rad = yaw_rad;
         self.run.limit_px = f32::MAX;
@@ -115,11 +125,16 @@ impl Icp {
         let back = self.run.there.is_some();
         let (source, target) =
             if back { (&self.second, &self.first) } else { (&self.first, &self.second) };
-        let Some((turn_rad, matched)) = iterate(&mut self.run, source, target, &self.grid) else {
+        let Some((turn_rad, matches)) = iterate(&mut self.run, source, target, &self.grid) else {
             return Progress::Done(None);
         };
-        self.run.iterations += 1;
-        if turn_rad.abs() >= self.run.settled_rad && self.run.iterations < MOST_ITERATIONS {
+        let matched = matches as f32 / source.len() as f32;
+        let run = &mut self.run;
+        run.iterations += 1;
+        let scatter_px = run.limit_px / TRIM;
+        let noise_rad = scatter_px / (MEAN_RADIUS * run.radius_px * quick_sqrt(matches as f32));
+        let settled = turn_rad.abs() < (run.settled * noise_rad).max(SETTLED_RAD);
+        if !settled && self.run.iterations < MOST_ITERATIONS {
             return Progress::Running;
         }
         let here = Registered { yaw_rad: self.run.yaw_rad, matched };
@@ -136,27 +151,21 @@ impl Icp {
     }
 }
 
-/// Matches the source to the target once and turns it; the turn in radians and the share that matched.
+/// Matches the source to the target once and turns it; the turn in radians and the number of matches.
 fn iterate(
     run: &mut Run,
     source: &[SlicePoint],
     target: &[SlicePoint],
     grid: &Grid,
-) -> Option<(f32, f32)> {
-    let lambda_px_per_s = match run.residual {
-        Residual::FixedAxis => 0.0,
-        // Twice the mean speed of the points: flat optimum between one and four times.
-        Residual::Helicoid { omega_rad_s } => 1.4 * run.radius_px * omega_rad_s.abs(),
-    };
-    let metric = Metric { lambda_px_per_s, reach_px: REACH_PX };
+) -> Option<(f32, usize)> {
     let mut point = PointToPoint::default();
     let mut helicoid = PointToHelicoid::default();
     let (mut matches, mut found, mut squares) = (0, 0, 0.0_f32);
     for from in source {
         let (x_px, y_px) = run.rigid.apply(from.x_px, from.y_px);
         let query = SlicePoint { x_px, y_px, ..*from };
-        let Some((index, distance2)) = grid.nearest(target, query, &metric) else { continue };
-        let to = &target[index];
+        let Some((index, distance2)) = grid.nearest(query) else { continue };
+        let Some(to) = target.get(index) else { continue };
         found += 1;
         match run.residual {
             Residual::FixedAxis => {
@@ -189,5 +198,5 @@ fn iterate(
     };
     run.rigid = run.rigid.then(turn_rad, shift_px);
     run.yaw_rad += turn_rad;
-    Some((turn_rad, matches as f32 / source.len() as f32))
+    Some((turn_rad, matches))
 }

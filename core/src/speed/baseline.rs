@@ -30,8 +30,8 @@ pub struct Effort {
     pub pairs: u32,
     /// Events in a slice at most.
     pub points: usize,
-    /// A registration ends when an iteration turns by less than this, in radians.
-    pub settled_rad: f32,
+    /// A registration ends when an iteration turns by less than this share of its noise.
+    pub settled: f32,
 }
 
 /// What is known of a rotor when its slices are cut.
@@ -119,7 +119,7 @@ impl Pairs {
             self.cut(window, path, icp);
             let residual = Residual::Helicoid { omega_rad_s: self.pace.omega_rad_s };
             let radius_px = self.pace.disc.radius_px;
-            icp.start(start_rad, radius_px, residual, self.effort.settled_rad);
+            icp.start(start_rad, radius_px, residual, self.effort.settled);
             self.registering = true;
             return false;
         }

@@ -32,8 +32,8 @@ const SEEN_PX: f32 = 3.0;
 const MOST_TURN_RAD: f32 = 1.2;
 const MOST_BLUR_RAD: f32 = 0.5;
 
-/// Turn below which an iteration is the last.
-const SETTLED_RAD: f32 = 1e-4;
+/// Share of a registration's noise below which a turn is the last.
+const SETTLED: f32 = 0.1;
 
 /// Speed by each burst, in rad/s.
 pub type Rates = Vec<f32, WINDOW_SEGMENTS>;
@@ -132,7 +132,7 @@ impl Ladder {
             return false;
         }
         let start_rad = self.rate.map_or(0.0, |rate| rate * baseline_s);
-        icp.start(start_rad, self.disc.radius_px, Residual::FixedAxis, SETTLED_RAD);
+        icp.start(start_rad, self.disc.radius_px, Residual::FixedAxis, SETTLED);
         self.baseline_s = baseline_s;
         true
     }

@@ -8,13 +8,15 @@ use crate::registration::Icp;
 use crate::store::Window;
 
 /// Slice pairs: refinement, lock, fractional-baseline test.
-pub(super) const REFINEMENT: Effort = Effort { pairs: 12, points: SLICE_POINTS, settled_rad: 1e-4 };
-const LOCK: Effort = Effort { pairs: 8, settled_rad: 5e-4, ..REFINEMENT };
+pub(super) const REFINEMENT: Effort = Effort { pairs: 12, points: SLICE_POINTS, settled: 0.1 };
+/// The paper's further refinement, kept to show what it gains.
+const FURTHER: Effort = Effort { pairs: 6, ..REFINEMENT };
+const LOCK: Effort = Effort { pairs: 8, settled: 0.2, ..REFINEMENT };
 const FRACTIONAL: Effort = Effort { pairs: 3, ..LOCK };
 /// The lock of a rotor that is followed: the phase tells its speed, and these bear it out.
 const FOLLOWING: Effort = Effort { pairs: 3, points: SLICE_POINTS / 2, ..LOCK };
 /// Where there are more events than this for each pair, more pairs are registered, up to [`MAX_PAIRS`].
-const PAIR_EVENTS: usize = 1_024;
+const PAIR_EVENTS: usize = 1_536;
 /// Step of the refinement in symmetry periods (paper: eta x half an angle of symmetry, eta = 0.8).
 pub(super) const REFINEMENT_PERIODS: f32 = 0.4;
 /// Baseline of the lock as a share of the window.
@@ -64,7 +66,7 @@ impl Measurement {
         {
             return self.refuse(Reason::Ambiguous);
         }
-        self.plan(window, REFINEMENT_PERIODS, self.worth(REFINEMENT));
+        self.plan(window, REFINEMENT_PERIODS, self.worth(FURTHER));
         if let Some(pairs) = &mut self.pairs {
             pairs.retarget(refined.omega_rad_s);
         }
