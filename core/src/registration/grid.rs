@@ -101,32 +101,28 @@ impl Grid {
         let mut best = (usize::MAX, reach_px * reach_px);
         let rings = (reach_px * self.per_px) as usize + 1;
         // The cell and those around it, then ring after ring.
-        let run = (column.saturating_sub(1), (column + 1).min(SIDE - 1));
-        for y in row.saturating_sub(1)..=(row + 1).min(SIDE - 1) {
-            self.visit(query, bank + y, run, &mut best);
-        }
-        for ring in 2..=rings {
+        for ring in 1..=rings {
             // Every cell of this ring is at least ring - 1 cells away.
             let closest = (ring - 1) as f32 * self.cell_px;
             if closest * closest > best.1 {
                 break;
             }
-            let (left, right) = (column.checked_sub(ring), column + ring);
-            let (first, last) = (row.checked_sub(ring), row + ring);
-            let run = (left.unwrap_or(0), right.min(SIDE - 1));
-            if let Some(first) = first {
-                self.visit(query, bank + first, run, &mut best);
-            }
-            for y in first.map_or(0, |first| first + 1)..last.min(SIDE) {
-                if let Some(left) = left {
-                    self.visit(query, bank + y, (left, left), &mut best);
+            let (left, right) = (column.wrapping_sub(ring), column + ring);
+            let (first, last) = (row.wrapping_sub(ring), row + ring);
+            let mut y = if first < SIDE { first } else { 0 };
+            while y <= last && y < SIDE {
+                if ring == 1 || y == first || y == last {
+                    let left = if left < SIDE { left } else { 0 };
+                    self.visit(query, bank + y, (left, right.min(SIDE - 1)), &mut best);
+                } else {
+                    if left < SIDE {
+                        self.visit(query, bank + y, (left, left), &mut best);
+                    }
+                    if right < SIDE {
+                        self.visit(query, bank + y, (right, right), &mut best);
+                    }
                 }
-                if right < SIDE {
-                    self.visit(query, bank + y, (right, right), &mut best);
-                }
-            }
-            if last < SIDE {
-                self.visit(query, bank + last, run, &mut best);
+                y += 1;
             }
         }
         let index = self.order.get(best.0)?;
@@ -141,14 +137,17 @@ impl Grid {
         (from, to): (usize, usize),
         best: &mut (usize, f32),
     ) {
-        let start = usize::from(self.starts[row * SIDE + from]);
-        let end = usize::from(self.starts[row * SIDE + to + 1]);
-        for (at, place) in self.places.get(start..end).unwrap_or(&[]).iter().enumerate() {
-            let (dx, dy, dt) = (place[0] - query[0], place[1] - query[1], place[2] - query[2]);
+        let (from, to) = (row * SIDE + from, row * SIDE + to + 1);
+        let mut at = self.starts.get(from).copied().map_or(0, usize::from);
+        let end = self.starts.get(to).copied().map_or(0, usize::from);
+        while at < end {
+            let Some([x, y, t]) = self.places.get(at) else { return };
+            let (dx, dy, dt) = (x - query[0], y - query[1], t - query[2]);
             let distance2 = dx * dx + dy * dy + dt * dt;
             if distance2 < best.1 {
-                *best = (start + at, distance2);
+                *best = (at, distance2);
             }
+            at += 1;
         }
     }
 }

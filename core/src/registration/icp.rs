@@ -3,7 +3,7 @@
 use super::grid::{Grid, Metric};
 use super::rigid::{PointToHelicoid, PointToPoint, Rigid};
 use super::slice::{Slice, SlicePoint};
-use crate::math::{quick_sqrt, sqrt};
+use crate::math::{larger, quick_sqrt, sqrt};
 
 /// Iterations in one direction.
 const MOST_ITERATIONS: u8 = 10;
@@ -14,8 +14,11 @@ const SETTLED_RAD: f32 = 1e-4;
 const MEAN_RADIUS: f32 = 0.7;
 /// Fewest matches that determine a yaw.
 const LEAST_MATCHES: usize = 12;
-/// Matches farther than this in pixels are not used.
+/// Matches farther than this in pixels are not used: of places only, and of places and times.
 const REACH_PX: f32 = 12.0;
+const HELICOID_REACH_PX: f32 = 8.0;
+/// How a second counts, in speeds of the rim: flat optimum from 0.7, the mean speed of the points, to four times that.
+const LAMBDA: f32 = 1.0;
 /// Half the side of the neighbour grid in radii of the rotor.
 const REACH_RADII: f32 = 1.2;
 /// Residuals beyond this many root mean squares of the iteration before are not used.
@@ -107,12 +110,13 @@ impl Icp {
 
     fn start_half(&mut self, yaw_rad: f32) {
         let target = if self.run.there.is_none() { &self.second } else { &self.first };
-        let lambda_px_per_s = match self.run.residual {
-            Residual::FixedAxis => 0.0,
-            // Twice the mean speed of the points: flat optimum between one and four times.
-            Residual::Helicoid { omega_rad_s } => 1.4 * self.run.radius_px * omega_rad_s.abs(),
+        let metric = match self.run.residual {
+            Residual::FixedAxis => Metric { lambda_px_per_s: 0.0, reach_px: REACH_PX },
+            Residual::Helicoid { omega_rad_s } => Metric {
+                lambda_px_per_s: LAMBDA * self.run.radius_px * omega_rad_s.abs(),
+                reach_px: HELICOID_REACH_PX,
+            },
         };
-        let metric = Metric { lambda_px_per_s, reach_px: REACH_PX };
         self.grid.build(target, REACH_RADII * self.run.radius_px, metric);
         self.run.rigid = Rigid::yaw(yaw_rad);
         self.run.yaw_rad = yaw_rad;
@@ -176,8 +180,9 @@ fn iterate(
                 }
             }
             Residual::Helicoid { omega_rad_s } => {
-                let r = quick_sqrt(x_px * x_px + y_px * y_px).max(1.0);
-                let u = (-y_px / r, x_px / r);
+                let r = larger(quick_sqrt(x_px * x_px + y_px * y_px), 1.0);
+                let per_px = 1.0 / r;
+                let u = (-y_px * per_px, x_px * per_px);
                 let along = (to.x_px - x_px) * u.0 + (to.y_px - y_px) * u.1
                     - r * omega_rad_s * (to.tau_s - from.tau_s);
                 squares += along * along;

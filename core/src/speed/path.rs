@@ -83,7 +83,8 @@ impl Path {
     #[must_use]
     pub fn place(&self, t_us: f32) -> (usize, f32) {
         let place = (t_us - self.start_us) * self.per_us;
-        let index = (place.max(0.0) as usize).min(self.blocks().saturating_sub(1));
+        // Casting a negative float gives 0.
+        let index = (place as usize).min(self.blocks().saturating_sub(1));
         (index, place - index as f32)
     }
 

@@ -9,7 +9,7 @@
 use nalgebra::{Matrix4, Vector4};
 
 use super::polar::PolarEvent;
-use crate::math::{TAU, Turn, TurnRate};
+use crate::math::{TAU, Turn, TurnRate, larger};
 use crate::rotors::Disc;
 
 /// Rings between centre and rim.
@@ -158,7 +158,7 @@ pub fn newton(
         let psi = phase(*event, rate, harmonic).minus(turns[bank(*event, disc)]);
         let (sin_psi, cos_psi) = psi.sin_cos();
         let (sin, cos) = event.angle().sin_cos();
-        let per_r = disc.radius_px / event.radius_px().max(1.0);
+        let per_r = disc.radius_px / larger(event.radius_px(), 1.0);
         let (x, y, t) = (-sin * per_r, cos * per_r, event.t_us as f32 * per_us);
         levers[0] += x;
         levers[1] += y;
