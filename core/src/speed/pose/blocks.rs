@@ -36,6 +36,8 @@ pub struct Block {
     later: [f32; 3],
     in_step: f32,
     time_us: f32,
+    /// Sums of how far through the block the events lie, and of its square.
+    way: [f32; 2],
 }
 
 impl Block {
@@ -58,6 +60,7 @@ impl Block {
         later: [0.0; 3],
         in_step: 0.0,
         time_us: 0.0,
+        way: [0.0; 2],
     };
 
     /// Adds an event: how its direction changes with a shift, its phase off the template, and when it came.
@@ -82,12 +85,21 @@ impl Block {
         self.later[2] += y * late;
         self.in_step += cos_psi;
         self.time_us += t_us;
+        self.way[0] += f;
+        self.way[1] += f * f;
     }
 
     /// What the block knows about turn and shift.
     fn weight(&self, m: f32) -> Matrix3<f32> {
         let ([x, y], [xx, xy, yy]) = (self.levers, self.products);
         Matrix3::new(self.count, x, y, x, xx, xy, y, xy, yy) * (self.share() * m * m)
+    }
+
+    /// Shares of the block's weight in the knot before it, between, and in the knot behind it: bursts of events lie anywhere.
+    fn shares(&self) -> (f32, f32, f32) {
+        let per_event = 1.0 / self.count.max(1.0);
+        let (way, square) = (self.way[0] * per_event, self.way[1] * per_event);
+        (1.0 - 2.0 * way + square, way - square, square)
     }
 
     /// Turn in radians by which the block as a whole is off at harmonic `m`, and its weight.
@@ -130,8 +142,7 @@ pub fn correct(path: &mut Path, blocks: &[Block; MAX_KNOTS], walk: Walk) -> Opti
         let (a, b) = (knots.get(k)?, knots.get(k + 1)?);
         Some(Vector3::new(b.turn_rad - a.turn_rad, b.x_px - a.x_px, b.y_px - a.y_px))
     };
-    // Events are spread evenly within a block: a third of their weight goes to either knot, a sixth between.
-    let link = |block: &Block| block.weight(m) / 6.0 - stiff;
+    let link = |block: &Block| block.weight(m) * block.shares().1 - stiff;
     let mut inverses = Vec::<Matrix3<f32>, MAX_KNOTS>::new();
     let mut sides = Vec::<Vector3<f32>, MAX_KNOTS>::new();
     for k in 0..knots.len() {
@@ -139,7 +150,7 @@ pub fn correct(path: &mut Path, blocks: &[Block; MAX_KNOTS], walk: Walk) -> Opti
         let mut side = Vector3::zeros();
         if let (Some(block), Some(step)) = (blocks.get(k), step(k)) {
             let (right, later) = (Vector3::from(block.right), Vector3::from(block.later));
-            pivot += block.weight(m) / 3.0 + stiff;
+            pivot += block.weight(m) * block.shares().0 + stiff;
             side += (right - later) * m + stiff * step;
         }
         let before = k
@@ -147,7 +158,7 @@ pub fn correct(path: &mut Path, blocks: &[Block; MAX_KNOTS], walk: Walk) -> Opti
             .and_then(|i| Some((blocks.get(i)?, step(i)?, inverses.get(i)?, sides.get(i)?)));
         if let Some((block, step, inverse, before)) = before {
             let link = link(block);
-            pivot += block.weight(m) / 3.0 + stiff - link * inverse * link;
+            pivot += block.weight(m) * block.shares().2 + stiff - link * inverse * link;
             side += Vector3::from(block.later) * m - stiff * step - link * (inverse * before);
         }
         inverses.push(pivot.try_inverse()?).ok();
