@@ -1,7 +1,7 @@
 //! Which rounds the pose is found in, and what each looks at.
 
 /// Corrections that move the rim by less than this, in pixels, are the last of their phase.
-const SETTLED_PX: f32 = 0.05;
+const SETTLED_PX: f32 = 0.3;
 
 /// Phases, each with more of the window's detail than the one before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -42,7 +42,7 @@ impl Schedule {
     pub const NEW: Self =
         Self { phase: Phase::First, round: 0, most: [3, 1, 6, 3], first_events: 3_072, share: 1 };
     /// For a rotor that was followed in the window before: a third of the events tell it as well.
-    pub const KNOWN: Self = Self { most: [1, 1, 3, 2], first_events: 1_536, share: 3, ..Self::NEW };
+    pub const KNOWN: Self = Self { most: [1, 0, 3, 2], first_events: 1_536, share: 3, ..Self::NEW };
 
     /// The phase that the next round belongs to.
     pub const fn phase(&self) -> Phase {
@@ -66,13 +66,15 @@ impl Schedule {
     pub fn advance(&mut self, moved_px: f32) -> bool {
         self.round += 1;
         let most = self.most.get(self.phase as usize).copied().unwrap_or(0);
-        let settled = moved_px < SETTLED_PX && self.phase >= Phase::Fine;
+        // In the first fine round the harmonic is not raised yet.
+        let settled = moved_px < SETTLED_PX && (self.phase != Phase::Fine || self.round > 1);
         if !settled && self.round < most {
             return false;
         }
         self.round = 0;
         self.phase = match self.phase {
-            Phase::First => Phase::Second,
+            Phase::First if self.most[1] > 0 => Phase::Second,
+            Phase::First => Phase::Fine,
             Phase::Second => Phase::Fine,
             Phase::Fine => Phase::All,
             Phase::All | Phase::Last => Phase::Last,
