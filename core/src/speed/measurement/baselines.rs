@@ -12,6 +12,10 @@ pub(super) const REFINEMENT: Effort = Effort { pairs: 12, points: SLICE_POINTS, 
 /// The paper's further refinement, kept to show what it gains.
 const FURTHER: Effort = Effort { pairs: 6, ..REFINEMENT };
 const LOCK: Effort = Effort { pairs: 8, settled: 0.2, ..REFINEMENT };
+/// A baseline that is not the longest only has to bear the next.
+const ON_THE_WAY: Effort = Effort { pairs: 4, ..LOCK };
+/// A baseline that is longer by less than this factor is not worth a lock of its own.
+const MORE: f32 = 1.5;
 const FRACTIONAL: Effort = Effort { pairs: 3, ..LOCK };
 /// The lock of a rotor that is followed: the phase tells its speed, and these bear it out.
 const FOLLOWING: Effort = Effort { pairs: 3, points: SLICE_POINTS / 2, ..LOCK };
@@ -91,13 +95,20 @@ impl Measurement {
         let pace = self.pace();
         let periods = window.duration_us as f32 / pace.period_us();
         let safe = SAFE_SLIP * pace.omega_rad_s.abs() / (3.0 * sigma_rad_s);
-        let mut m = libm::floorf((LOCK_SHARE * periods).min(safe)).max(1.0);
+        let longest = LOCK_SHARE * periods;
+        let mut m = libm::floorf(longest.min(safe)).max(1.0);
         // Where the parts differ, only a whole revolution brings back the same picture.
         let parts = pace.parts as f32;
         if !self.alike && m >= parts {
             m = libm::floorf(m / parts) * parts;
         }
-        let effort = if self.follows { FOLLOWING } else { self.worth(LOCK) };
+        let effort = if self.follows {
+            FOLLOWING
+        } else if longest > MORE * m {
+            ON_THE_WAY
+        } else {
+            self.worth(LOCK)
+        };
         self.plan(window, m, effort);
     }
 
@@ -112,7 +123,7 @@ impl Measurement {
             self.omega_rad_s = found.omega_rad_s;
             let sigma = found.sigma_rad_s.max(found.omega_rad_s.abs() * 1e-5);
             self.plan_lock(window, sigma);
-            if self.pairs.as_ref().is_some_and(|next| next.periods() > 1.5 * longest) {
+            if self.pairs.as_ref().is_some_and(|next| next.periods() > MORE * longest) {
                 return;
             }
         }
