@@ -24,7 +24,7 @@ use crate::limits::MAX_KNOTS;
 use crate::math::{TAU, Turn, TurnRate, quick_sqrt, sqrt};
 use crate::rotors::Disc;
 use crate::store::Window;
-use blocks::{BLOCK_SHARE, Block, LEAST_SHARE, WALK_PX, WALK_SINGLE_PX, Walk, correct};
+use blocks::{BLOCK_SHARE, Block, LEAST_SHARE, WALK_PX, WALK_SINGLE_PX, WALK_US, Walk, correct};
 use schedule::{Phase, Schedule};
 use template::{BANKS, Counts, RINGS, Template};
 
@@ -235,7 +235,7 @@ impl Pose {
         let mut moved_px = f32::MAX;
         if self.phases.is_some() {
             let walk = Walk {
-                step_px: self.walk_px,
+                step_px: self.walk_px * (self.path.step_us() / WALK_US).max(1.0),
                 coherence: self.coherence,
                 harmonic: self.harmonic,
                 radius_px: self.disc.radius_px,

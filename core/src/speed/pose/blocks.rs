@@ -14,7 +14,8 @@ pub const LEAST_SHARE: f32 = 0.05;
 /// How far the axis is thought to be off the path, in pixels: keeps the shift of a block finite where its events lie to
 /// one side of the axis.
 const SHIFT_PRIOR_PX: f32 = 2.0;
-/// How far the path walks from knot to knot.
+/// How far the path walks from knot to knot that are so far apart, or nearer.
+pub const WALK_US: f32 = 5_000.0;
 pub const WALK_PX: f32 = 0.5;
 /// The same for a rotor with a single mark, whose shift and turn look alike.
 pub const WALK_SINGLE_PX: f32 = 0.05;
