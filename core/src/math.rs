@@ -109,6 +109,12 @@ impl Turn {
         Self(self.0.wrapping_add(other.0))
     }
 
+    /// Which of so many equal sectors of the circle the angle lies in.
+    #[must_use]
+    pub const fn sector(self, sectors: u32) -> u32 {
+        ((self.0 as u64 * sectors as u64) >> 32) as u32
+    }
+
     /// (sine, cosine), absolute error below 2e-7.
     #[must_use]
     pub fn sin_cos(self) -> (f32, f32) {

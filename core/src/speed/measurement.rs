@@ -327,7 +327,7 @@ impl Measurement {
             let parts = if self.alike { u32::from(self.parts.unwrap_or(1)).max(1) } else { 1 };
             let pose =
                 Pose::new(self.disc, self.omega_rad_s, parts, self.harmonic, window.duration_us);
-            let pose = if self.alike { pose } else { pose.unlike() };
+            let pose = if self.alike { pose } else { pose.unlike(self.parts.unwrap_or(1)) };
             self.pose = if self.follows { pose.known() } else { pose };
         }
         if !self.pose.step(window, sums) {

@@ -86,6 +86,8 @@ pub struct Pose {
     harmonic: u32,
     first_harmonic: u32,
     most_harmonic: u32,
+    /// Parts that have a template of their own.
+    sectors: u32,
     walk_px: f32,
     path: Path,
     /// Blocks in a symmetry period, 0 when blocks are whole periods.
@@ -122,6 +124,7 @@ impl Pose {
             harmonic,
             first_harmonic: harmonic,
             most_harmonic: MOST_HARMONIC,
+            sectors: 1,
             walk_px: if parts > 1 { WALK_PX } else { WALK_SINGLE_PX },
             path: Path::STILL,
             in_period: 0,
@@ -143,11 +146,13 @@ impl Pose {
         self
     }
 
-    /// The same for a rotor whose parts differ: the template takes them for one, so that a high harmonic shows their
-    /// differences.
+    /// The same for a rotor of so many parts that differ: each has its own template, on fewer rings.
     #[must_use]
-    pub const fn unlike(mut self) -> Self {
-        self.most_harmonic = 2 * self.harmonic;
+    pub const fn unlike(mut self, parts: u8) -> Self {
+        if parts > 1 {
+            self.sectors = parts as u32;
+            self.walk_px = WALK_PX;
+        }
         self
     }
 
@@ -294,7 +299,8 @@ impl Pose {
         let stride = self.events.div_ceil(self.schedule.events(self.events)).max(1);
         let disc = Moving::new(self.disc, &self.path, window);
         let rate = TurnRate::from_rad_s(self.omega_rad_s);
-        let rings_per_px = RINGS as f32 / self.disc.radius_px.max(1.0);
+        let rings = (RINGS / self.sectors as usize).max(1);
+        let rings_per_px = rings as f32 / self.disc.radius_px.max(1.0);
         let doubles = self.may_double();
         for event in window.segment(self.segment).iter().step_by(stride) {
             let t_us = disc.since_middle_us(*event);
@@ -302,10 +308,11 @@ impl Pose {
             let knot = self.path.between((index, f));
             let Some((x_px, y_px, r2)) = disc.place_by(*event, knot) else { continue };
             let turn = Turn::from_rad(knot.turn_rad).plus(rate.after(t_us));
-            let angle = Turn::of_vector(y_px, x_px);
-            let (s, c) = angle.minus(turn).times(self.harmonic).sin_cos();
-            let ring = ((quick_sqrt(r2) * rings_per_px) as usize).min(RINGS - 1);
-            let bank = 2 * ring + usize::from(event.is_on());
+            let angle = Turn::of_vector(y_px, x_px).minus(turn);
+            let (s, c) = angle.times(self.harmonic).sin_cos();
+            let ring = ((quick_sqrt(r2) * rings_per_px) as usize).min(rings - 1);
+            let sector = angle.sector(self.sectors) as usize;
+            let bank = (2 * (sector * rings + ring) + usize::from(event.is_on())).min(BANKS - 1);
             sums.counts[bank] += 1;
             sums.low.add(bank, (s, c));
             if doubles {
