@@ -29,7 +29,7 @@ use schedule::{Phase, Schedule};
 use template::{BANKS, Counts, RINGS, Template};
 
 /// Events that a block should hold.
-const BLOCK_EVENTS: usize = 64;
+const BLOCK_EVENTS: usize = 32;
 /// Shortest block: a hand trembles up to 12 Hz, a host shakes up to some 60 Hz.
 const SHORTEST_BLOCK_US: f32 = 3_000.0;
 /// Most blocks in a symmetry period.
@@ -98,6 +98,9 @@ pub struct Pose {
     first_coherence: f32,
     /// Rotor's events in the window.
     events: usize,
+    /// Share of them that would be left if all were thinned as the thinnest are: the store keeps dense bursts, and blocks
+    /// beside them hold few events.
+    even_share: f32,
     started: bool,
     schedule: Schedule,
     /// Segment of the window that is looked at next.
@@ -132,6 +135,7 @@ impl Pose {
             coherence: 0.0,
             first_coherence: 0.0,
             events: 0,
+            even_share: 1.0,
             started: false,
             schedule: Schedule::NEW,
             segment: 0,
@@ -205,7 +209,13 @@ impl Pose {
         if !self.started {
             self.started = true;
             let disc = Moving::new(self.disc, &self.path, window);
-            self.events = window.events().filter(|event| disc.place(*event).is_some()).count();
+            let (mut arrived, mut coarsest) = (0_u64, 0);
+            for event in window.events().filter(|event| disc.place(*event).is_some()) {
+                self.events += 1;
+                arrived += 1 << event.weight_log2();
+                coarsest = coarsest.max(event.weight_log2());
+            }
+            self.even_share = (arrived >> coarsest) as f32 / (self.events as f32).max(1.0);
             self.divide();
         }
         if self.segment == 0 {
@@ -279,7 +289,8 @@ impl Pose {
     /// Lays the path through as many blocks as the phase and the events allow.
     fn divide(&mut self) {
         let events = self.events.min(self.schedule.events(self.events));
-        let most = (events / BLOCK_EVENTS).min(self.schedule.blocks());
+        let even = (events as f32 * self.even_share) as usize;
+        let most = (even / BLOCK_EVENTS).min(self.schedule.blocks());
         let most = most.clamp(4, MAX_KNOTS - 1) as f32;
         let shortest = (self.window_us / most).max(SHORTEST_BLOCK_US);
         let split = libm::floorf((self.period_us / shortest).min(MOST_IN_PERIOD));
