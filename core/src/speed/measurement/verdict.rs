@@ -117,7 +117,7 @@ impl Measurement {
     /// Whether the rotor has edges: what merely keeps step with one frequency has none, and a wrong harmonic about a wrong
     /// centre has no overtone.
     pub(super) fn has_edges(&self) -> bool {
-        if self.in_doubt() && !self.pose.has_overtone() {
+        if self.in_doubt() {
             return false;
         }
         let most_px = self.blur_px(MOST_BLUR).max(self.pose.least_blur_px());
@@ -165,7 +165,7 @@ impl Measurement {
                 && phase.sigma_rad_s < COARSE_PHASE_SIGMA * omega.abs()
         });
         let alike = |rate: &f32| (rate - omega).abs() < COARSE_SPREAD * omega.abs();
-        even && (self.rates.iter().all(alike) || self.sharp())
+        even && !self.doubted() && (self.rates.iter().all(alike) || self.sharp())
     }
 }
 
