@@ -74,14 +74,14 @@ impl Measurement {
             } else if sharp && long {
                 self.estimate = both;
                 self.status = Status::Locked;
-            } else if long {
-                // Too rough for a lock, and no better than either.
-                let spread = self.estimate.sigma_rad_s;
-                let sigma_rad_s = sqrt(both.sigma_rad_s * both.sigma_rad_s + spread * spread);
-                self.estimate = Estimate { sigma_rad_s, ..both };
             } else if sharp {
                 // Right if the parts are as alike as they look: the window shows too few to be sure.
                 let spread = ALIKE_SIGMA * self.estimate.sigma_rad_s;
+                let sigma_rad_s = sqrt(both.sigma_rad_s * both.sigma_rad_s + spread * spread);
+                self.estimate = Estimate { sigma_rad_s, ..both };
+            } else {
+                // Too rough for a lock, and no better than either.
+                let spread = self.estimate.sigma_rad_s;
                 let sigma_rad_s = sqrt(both.sigma_rad_s * both.sigma_rad_s + spread * spread);
                 self.estimate = Estimate { sigma_rad_s, ..both };
             }
