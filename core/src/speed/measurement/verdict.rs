@@ -89,6 +89,11 @@ impl Measurement {
         if phase.is_none() || (lock.is_none() && !self.coarse_stands(phase)) {
             self.status = Status::Refused(Reason::Ambiguous);
         }
+        if let (None, Some(phase)) = (lock, phase) {
+            let both = combine(self.estimate, phase);
+            let sigma_rad_s = both.sigma_rad_s.max(self.estimate.sigma_rad_s);
+            self.estimate = Estimate { sigma_rad_s, ..both };
+        }
         let clock = stated.clock_sigma_ppm * 1e-6 * self.estimate.omega_rad_s;
         let roll = if self.drift_px_s > STILL_PX_S {
             ROLL_RAD_PER_PX * self.drift_px_s * roll_share(window_s)
