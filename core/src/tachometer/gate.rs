@@ -1,0 +1,100 @@
+//! The gate that every event passes: in time, and in view.
+//!
+//! Nearly every event is later than the one before, earlier than the end of the open segment, and in view. That is
+//! all that is asked here, of many at once; what else an event may be is told elsewhere, one by one.
+
+use crate::event::{Geometry, PackedEvent};
+use crate::settings::Settings;
+
+/// Upper bits of column and row, which no pixel on a sensor has: where they end up set, a subtraction has borrowed.
+const BORROWED: u32 = 0x8000_8000;
+
+/// What an event must be to pass.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gate {
+    /// Low 32 bits of the time of the last event that passed.
+    low_us: u32,
+    /// How much later than that the next must not be.
+    left_us: u32,
+    /// First column and row in view.
+    origin: u32,
+    /// Columns and rows in view behind these.
+    span: u32,
+    sensor: Geometry,
+}
+
+/// How many events came as far as the gate could tell, and how many of them were not in view.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Seen {
+    /// All of them: the next is for others to judge.
+    pub events: usize,
+    /// Off the sensor.
+    pub out_of_bounds: usize,
+    /// Outside the region of interest.
+    pub out_of_roi: usize,
+}
+
+impl Seen {
+    /// Those that passed.
+    pub const fn passed(&self) -> usize {
+        self.events - self.out_of_bounds - self.out_of_roi
+    }
+}
+
+impl Gate {
+    /// A gate for events from `last_us` on and before `end_us`, both in microseconds; `None` when nothing is in view.
+    pub fn new(settings: &Settings, last_us: u64, end_us: u64) -> Option<Self> {
+        let sensor = settings.geometry;
+        let whole = (0, 0, sensor.width_px, sensor.height_px);
+        let (x0, y0, x1, y1) = settings.roi.map_or(whole, |roi| {
+            let (x1, y1) =
+                (roi.x.saturating_add(roi.width_px), roi.y.saturating_add(roi.height_px));
+            (roi.x, roi.y, x1.min(sensor.width_px), y1.min(sensor.height_px))
+        });
+        let pixel = |x: u16, y: u16| u32::from(y) << 16 | u32::from(x);
+        (x0 < x1 && y0 < y1).then(|| Self {
+            low_us: last_us as u32,
+            // A quarter of the span of the low bits: what is further off is never taken for something near.
+            left_us: end_us.saturating_sub(last_us).min(1 << 30) as u32,
+            origin: pixel(x0, y0),
+            span: pixel(x1 - 1 - x0, y1 - 1 - y0) | BORROWED,
+            sensor,
+        })
+    }
+
+    /// How much time has passed since an event, in microseconds modulo 2^32.
+    pub const fn since(&self, low_us: u32) -> u32 {
+        self.low_us.wrapping_sub(low_us)
+    }
+
+    /// Lets events pass up to the first that is not in time; `passed` gets column and row of each.
+    #[inline(always)]
+    pub fn admit(&mut self, events: &[PackedEvent], mut passed: impl FnMut(u32, u32)) -> Seen {
+        let mut seen = Seen { events: events.len(), ..Seen::default() };
+        let Self { mut low_us, mut left_us, origin, span, sensor } = *self;
+        for (index, event) in events.iter().enumerate() {
+            // A step back is a large one.
+            let step_us = event.low_us().wrapping_sub(low_us);
+            if step_us >= left_us {
+                seen.events = index;
+                break;
+            }
+            let pixel = event.pixel();
+            let (x, y) = (pixel & 0xffff, pixel >> 16);
+            let from_origin = pixel.wrapping_sub(origin);
+            if span.wrapping_sub(from_origin) & !from_origin & BORROWED != BORROWED {
+                if sensor.contains(x as u16, y as u16) {
+                    seen.out_of_roi += 1;
+                } else {
+                    seen.out_of_bounds += 1;
+                }
+                continue;
+            }
+            left_us -= step_us;
+            low_us = event.low_us();
+            passed(x, y);
+        }
+        (self.low_us, self.left_us) = (low_us, left_us);
+        seen
+    }
+}
