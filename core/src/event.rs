@@ -36,6 +36,8 @@ pub struct PackedEvent {
 }
 
 impl PackedEvent {
+    /// All bits zero.
+    pub const ZERO: Self = Self { low_us: 0, pixel: 0 };
     /// Bit of the polarity in the pixel.
     pub(crate) const BRIGHTER: u32 = 1 << 31;
     /// Last row that fits: far off every sensor, so that rows beyond may well be taken for it.

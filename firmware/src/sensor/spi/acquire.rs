@@ -7,15 +7,14 @@ use embassy_sync::zerocopy_channel::Sender;
 use embassy_time::{Duration, Instant, Timer};
 use embedded_hal_async::digital::Wait;
 use embedded_hal_async::spi::SpiDevice;
-use evtach_core::Geometry;
+use evtach_core::{Geometry, PackedEvent};
 
 use super::account::{Account, Lost};
 use super::driver::{LinkError, SILENCE, SpiSensor};
 use super::frame::{Hello, Kind};
 use super::parser::Frame;
 use super::words::Words;
-use crate::intake::{BLOCK_EVENTS, BLOCKS, Block, Pace};
-use crate::record;
+use crate::intake::{BLOCKS, Block, Pace};
 
 /// Reads without a sound frame after which a recording is held to be over: about 64 KiB.
 const SILENT_READS: u32 = 32;
@@ -228,27 +227,31 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
                 self.lost += u64::from(events - before);
                 break;
             };
-            slot.records.clear();
-            let mask = (1 << self.stride_log2) - 1;
+            slot.clear();
             while !words.is_done() {
-                let room = BLOCK_EVENTS - slot.records.len();
+                let room = slot.space().len();
                 if room < words.most_events_a_word() {
                     break;
                 }
-                words.decode(room / words.most_events_a_word(), |event| {
-                    events += 1;
-                    self.phase = self.phase.wrapping_add(1);
-                    if self.phase & mask != 0 {
-                        self.acquired.thinned += 1;
-                        return;
-                    }
-                    if slot.records.is_empty() {
-                        slot.t_us = event.t_us;
-                    }
-                    slot.records.push(record::encode(&event)).ok();
-                });
+                let Some((count, first_us)) = fill(&mut words, slot) else { continue };
+                events += count as u32;
+                let before = slot.events().len() - count;
+                if self.stride_log2 > 0 {
+                    let mask = (1 << self.stride_log2) - 1;
+                    let phase = &mut self.phase;
+                    let went = slot.retain(before, || {
+                        *phase = phase.wrapping_add(1);
+                        *phase & mask == 0
+                    });
+                    self.acquired.thinned += went as u64;
+                }
+                if before == 0
+                    && let Some(first) = slot.events().first()
+                {
+                    slot.t_us = first.unpack(first_us).t_us;
+                }
             }
-            if !slot.records.is_empty() {
+            if !slot.events().is_empty() {
                 slot.geometry = geometry;
                 slot.lost = mem::take(&mut self.lost);
                 slot.last = false;
@@ -270,9 +273,29 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
     /// Marks the end of a recording.
     async fn close(&mut self) {
         let slot = self.blocks.send().await;
-        slot.records.clear();
+        slot.clear();
         slot.lost = mem::take(&mut self.lost);
         slot.last = true;
         self.blocks.send_done();
     }
+}
+
+/// Fills the space of a block, as far as words cannot overfill it; returns how many events came, and the time of
+/// the first in microseconds; `None` when none did.
+fn fill(words: &mut Words<'_>, block: &mut Block) -> Option<(usize, u64)> {
+    let most = words.most_events_a_word();
+    let space = block.space();
+    let (room, mut first_us) = (space.len(), None);
+    let mut places = space.iter_mut();
+    words.decode(room / most, |event| {
+        if first_us.is_none() {
+            first_us = Some(event.t_us);
+        }
+        if let Some(place) = places.next() {
+            *place = PackedEvent::pack(&event);
+        }
+    });
+    let count = room - places.len();
+    block.filled(count);
+    first_us.map(|first_us| (count, first_us))
 }

@@ -62,8 +62,9 @@ impl<'f> Words<'f> {
     #[inline]
     pub fn decode(&mut self, words: usize, mut emit: impl FnMut(Event)) {
         let base_us = self.base_us;
+        // Times that no sensor reaches may wrap.
         let mut place =
-            |event: Event| emit(Event { t_us: base_us.saturating_add(event.t_us), ..event });
+            |event: Event| emit(Event { t_us: base_us.wrapping_add(event.t_us), ..event });
         match &mut self.decoder {
             Decoder::Evt2(decoder) => {
                 for word in take(&mut self.rest, words) {
