@@ -48,31 +48,32 @@ impl Default for Segment {
 }
 
 impl Store<'_> {
-    /// Events that are passed over before the next is kept.
-    #[inline]
-    pub const fn to_pass(&self) -> usize {
-        self.segments[self.slot(self.closed)].skip as usize
-    }
-
-    /// Passes over events, at most as many as [`Self::to_pass`] says.
-    #[inline]
-    pub const fn pass(&mut self, count: usize) {
+    /// Takes in events of the open segment.
+    // A function of its own, so that all it needs stays in registers.
+    #[inline(never)]
+    pub fn push(&mut self, events: &[PackedEvent]) {
         let slot = self.slot(self.closed);
+        let mut rest = events;
+        let mut kept = 0;
+        loop {
+            let skip = self.segments[slot].skip as usize;
+            let Some((event, later)) = rest.get(skip..).and_then(<[_]>::split_first) else { break };
+            self.keep(slot, *event);
+            kept += 1;
+            rest = later;
+        }
         let segment = &mut self.segments[slot];
-        segment.skip = segment.skip.saturating_sub(count as u32);
-        segment.counted += count as u64;
-        self.thinned += count as u64;
+        segment.skip -= rest.len() as u32;
+        segment.counted += events.len() as u64;
+        self.thinned += (events.len() - kept) as u64;
     }
 
-    /// Keeps an event of the open segment; [`Self::to_pass`] says how many to pass over then.
-    #[inline]
-    pub fn keep(&mut self, event: PackedEvent) {
-        let slot = self.slot(self.closed);
+    #[inline(always)]
+    fn keep(&mut self, slot: usize, event: PackedEvent) {
         if self.segments[slot].len >= self.segments[slot].until {
             self.turn(slot);
         }
         let segment = &mut self.segments[slot];
-        segment.counted += 1;
         if let Some(place) = self.events.get_mut(slot * self.capacity + segment.len) {
             *place = StoredEvent::store(event, segment.step_log2);
             segment.len += 1;

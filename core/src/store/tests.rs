@@ -10,11 +10,7 @@ fn fill(store: &mut Store<'_>, times: impl Iterator<Item = u64>) {
         while t_us >= store.open_end_us() {
             store.close_segment();
         }
-        if store.to_pass() > 0 {
-            store.pass(1);
-        } else {
-            store.keep(PackedEvent::pack(&event(t_us)));
-        }
+        store.push(&[PackedEvent::pack(&event(t_us))]);
     }
 }
 

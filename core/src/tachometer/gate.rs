@@ -4,6 +4,7 @@
 //! all that is asked here, of many at once; what else an event may be is told elsewhere, one by one.
 
 use crate::event::{Geometry, PackedEvent};
+use crate::rotors::heat::Counter;
 use crate::settings::Settings;
 
 /// Upper bits of column and row, which no pixel on a sensor has: where they end up set, a subtraction has borrowed.
@@ -23,22 +24,13 @@ pub(super) struct Gate {
     sensor: Geometry,
 }
 
-/// How many events came as far as the gate could tell, and how many of them were not in view.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Seen {
-    /// All of them: the next is for others to judge.
-    pub events: usize,
+/// Where a pixel lies that is not in view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Outside {
     /// Off the sensor.
-    pub out_of_bounds: usize,
+    Sensor,
     /// Outside the region of interest.
-    pub out_of_roi: usize,
-}
-
-impl Seen {
-    /// Those that passed.
-    pub const fn passed(&self) -> usize {
-        self.events - self.out_of_bounds - self.out_of_roi
-    }
+    Roi,
 }
 
 impl Gate {
@@ -67,34 +59,54 @@ impl Gate {
         self.low_us.wrapping_sub(low_us)
     }
 
-    /// Lets events pass up to the first that is not in time; `passed` gets column and row of each.
+    /// Lets events pass up to the first that is not in time or not in view, and counts them in the heat map; returns how many.
+    // A function of its own, so that all it needs stays in registers.
+    #[inline(never)]
+    pub fn admit(&mut self, events: &[PackedEvent], heat: &mut Counter<'_>) -> usize {
+        self.admit_each(events, |x, y| heat.add(x, y))
+    }
+
+    /// The same for events that are not to be counted.
+    #[inline(never)]
+    pub fn admit_uncounted(&mut self, events: &[PackedEvent]) -> usize {
+        self.admit_each(events, |_, _| ())
+    }
+
     #[inline(always)]
-    pub fn admit(&mut self, events: &[PackedEvent], mut passed: impl FnMut(u32, u32)) -> Seen {
-        let mut seen = Seen { events: events.len(), ..Seen::default() };
-        let Self { mut low_us, mut left_us, origin, span, sensor } = *self;
-        for (index, event) in events.iter().enumerate() {
+    fn admit_each(&mut self, events: &[PackedEvent], mut passed: impl FnMut(u32, u32)) -> usize {
+        let Self { mut low_us, mut left_us, .. } = *self;
+        let mut rest = events.iter();
+        let mut stopped = 0;
+        for event in rest.by_ref() {
             // A step back is a large one.
             let step_us = event.low_us().wrapping_sub(low_us);
-            if step_us >= left_us {
-                seen.events = index;
+            if step_us >= left_us || self.is_outside(event.pixel()) {
+                stopped = 1;
                 break;
-            }
-            let pixel = event.pixel();
-            let (x, y) = (pixel & 0xffff, pixel >> 16);
-            let from_origin = pixel.wrapping_sub(origin);
-            if span.wrapping_sub(from_origin) & !from_origin & BORROWED != BORROWED {
-                if sensor.contains(x as u16, y as u16) {
-                    seen.out_of_roi += 1;
-                } else {
-                    seen.out_of_bounds += 1;
-                }
-                continue;
             }
             left_us -= step_us;
             low_us = event.low_us();
-            passed(x, y);
+            passed(event.pixel() & 0xffff, event.pixel() >> 16);
         }
         (self.low_us, self.left_us) = (low_us, left_us);
-        seen
+        events.len() - rest.len() - stopped
+    }
+
+    #[inline(always)]
+    const fn is_outside(&self, pixel: u32) -> bool {
+        let from_origin = pixel.wrapping_sub(self.origin);
+        self.span.wrapping_sub(from_origin) & !from_origin & BORROWED != BORROWED
+    }
+
+    /// Where an event lies that is in time but not in view.
+    pub const fn outside(&self, event: PackedEvent) -> Option<Outside> {
+        let pixel = event.pixel();
+        if event.low_us().wrapping_sub(self.low_us) >= self.left_us || !self.is_outside(pixel) {
+            None
+        } else if self.sensor.contains(pixel as u16, (pixel >> 16) as u16) {
+            Some(Outside::Roi)
+        } else {
+            Some(Outside::Sensor)
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use super::gate::Gate;
+use super::gate::{Gate, Outside};
 use super::{BASE_WINDOW_US, FIRST_WINDOW_US, Job, LONGEST_WINDOW_US, Tachometer, segment_us};
 use crate::event::{Event, GyroSample, PackedEvent};
 use crate::store::WINDOW_SEGMENTS;
@@ -69,26 +69,23 @@ impl Tachometer<'_> {
         let mut taken = 0;
         loop {
             let rest = &events[taken..];
-            let to_pass = if self.overrun { rest.len() } else { self.store.to_pass() };
-            let now = &rest[..rest.len().min(to_pass.max(1))];
-            let seen = if self.overrun {
-                gate.admit(now, |_, _| ())
+            let passed = if self.overrun {
+                let passed = gate.admit_uncounted(rest);
+                self.ignored.overrun += passed as u64;
+                passed
             } else {
-                gate.admit(now, |x, y| heat.add(x, y))
+                let passed = gate.admit(rest, &mut heat);
+                self.store.push(&rest[..passed]);
+                passed
             };
-            self.ignored.out_of_bounds += seen.out_of_bounds as u64;
-            self.ignored.out_of_roi += seen.out_of_roi as u64;
-            taken += seen.events;
-            if self.overrun {
-                self.ignored.overrun += seen.passed() as u64;
-            } else if to_pass > 0 {
-                self.store.pass(seen.passed());
-            } else if let Some(event) = now.first().filter(|_| seen.passed() > 0) {
-                self.store.keep(*event);
+            taken += passed;
+            let Some(stopped) = events.get(taken) else { break };
+            match gate.outside(*stopped) {
+                Some(Outside::Sensor) => self.ignored.out_of_bounds += 1,
+                Some(Outside::Roi) => self.ignored.out_of_roi += 1,
+                None => break,
             }
-            if seen.events < now.len() || taken == events.len() {
-                break;
-            }
+            taken += 1;
         }
         if let Some(last) = events[..taken].last() {
             let reached_us = self.last_us + u64::from(gate.since(self.last_us as u32));
@@ -130,11 +127,7 @@ impl Tachometer<'_> {
             return;
         }
         self.heat.counter().add(event.x.into(), event.y.into());
-        if self.store.to_pass() > 0 {
-            self.store.pass(1);
-        } else {
-            self.store.keep(PackedEvent::pack(event));
-        }
+        self.store.push(&[PackedEvent::pack(event)]);
     }
 
     /// Forgets the window; rotors keep their letters.
