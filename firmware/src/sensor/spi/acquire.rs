@@ -7,7 +7,7 @@ use embassy_sync::zerocopy_channel::Sender;
 use embassy_time::{Duration, Instant, Timer};
 use embedded_hal_async::digital::Wait;
 use embedded_hal_async::spi::SpiDevice;
-use evtach_core::{Geometry, PackedEvent};
+use evtach_core::Geometry;
 
 use super::account::{Account, Lost};
 use super::driver::{LinkError, SILENCE, SpiSensor};
@@ -233,9 +233,9 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
                 if room < words.most_events_a_word() {
                     break;
                 }
-                let Some((count, first_us)) = fill(&mut words, slot) else { continue };
+                let (before, count) = (slot.events().len(), words.pack(slot.space()));
+                slot.filled(count);
                 events += count as u32;
-                let before = slot.events().len() - count;
                 if self.stride_log2 > 0 {
                     let mask = (1 << self.stride_log2) - 1;
                     let phase = &mut self.phase;
@@ -245,13 +245,9 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
                     });
                     self.acquired.thinned += went as u64;
                 }
-                if before == 0
-                    && let Some(first) = slot.events().first()
-                {
-                    slot.t_us = first.unpack(first_us).t_us;
-                }
             }
-            if !slot.events().is_empty() {
+            if let Some(first) = slot.events().first() {
+                slot.t_us = first.unpack(frame.header.t_us).t_us;
                 slot.geometry = geometry;
                 slot.lost = mem::take(&mut self.lost);
                 slot.last = false;
@@ -278,24 +274,4 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
         slot.last = true;
         self.blocks.send_done();
     }
-}
-
-/// Fills the space of a block, as far as words cannot overfill it; returns how many events came, and the time of
-/// the first in microseconds; `None` when none did.
-fn fill(words: &mut Words<'_>, block: &mut Block) -> Option<(usize, u64)> {
-    let most = words.most_events_a_word();
-    let space = block.space();
-    let (room, mut first_us) = (space.len(), None);
-    let mut places = space.iter_mut();
-    words.decode(room / most, |event| {
-        if first_us.is_none() {
-            first_us = Some(event.t_us);
-        }
-        if let Some(place) = places.next() {
-            *place = PackedEvent::pack(&event);
-        }
-    });
-    let count = room - places.len();
-    block.filled(count);
-    first_us.map(|first_us| (count, first_us))
 }
