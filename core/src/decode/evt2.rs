@@ -104,17 +104,36 @@ impl Evt2 {
 /// Packs events up to the first word that is none, and returns how many.
 fn pack_run(words: &[[u8; 4]], places: &mut [PackedEvent], base_us: u32) -> usize {
     let mut run = 0;
-    for (word, place) in words.iter().zip(places) {
-        let word = u32::from_le_bytes(*word);
-        if word >= 2 << HIGH_BITS {
+    let fours = words.as_chunks::<4>().0.iter().zip(places.as_chunks_mut::<4>().0);
+    for (words, places) in fours {
+        let [a, b, c, d] = words.map(u32::from_le_bytes);
+        if !is_event(a | b | c | d) {
             break;
         }
-        let (low_us, x, y) =
-            (base_us | word >> 22 & 0x3f, (word >> 11 & 0x7ff) as u16, (word & 0x7ff) as u16);
-        *place = PackedEvent::new(low_us, x, y, polarity(word >> HIGH_BITS != 0));
+        *places = [a, b, c, d].map(|word| pack(word, base_us));
+        run += 4;
+    }
+    for (word, place) in words.iter().zip(places).skip(run) {
+        let word = u32::from_le_bytes(*word);
+        if !is_event(word) {
+            break;
+        }
+        *place = pack(word, base_us);
         run += 1;
     }
     run
+}
+
+/// Whether a word is an event, or all of several whose bits it holds are.
+#[inline(always)]
+const fn is_event(word: u32) -> bool {
+    word < 2 << HIGH_BITS
+}
+
+#[inline(always)]
+const fn pack(word: u32, base_us: u32) -> PackedEvent {
+    let (x, y) = ((word >> 11 & 0x7ff) as u16, (word & 0x7ff) as u16);
+    PackedEvent::new(base_us | word >> 22 & 0x3f, x, y, polarity(word >> HIGH_BITS != 0))
 }
 
 #[cfg(test)]
