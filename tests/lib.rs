@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use evtach_core::{Event, Geometry, Reading, RotorReading, Settings};
 use evtach_host::measure::{Capacity, Summary, measure_events, summarise};
 use evtach_host::recording::{self, OpenOptions, RecordingError};
+use evtach_host::synth::RotorTruth;
 
 /// Writes a table to the test's output, past libtest, which shows what `println!` writes for failed tests only.
 pub fn show(text: &str) {
@@ -63,7 +64,7 @@ pub fn measure(loaded: &Loaded, capacity: Capacity) -> (Vec<Reading>, Summary) {
 }
 
 /// What is true of a rotor.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Deserialize)]
 pub struct Truth {
     /// Mean place of the centre in pixels.
     pub centre_px: [f64; 2],
@@ -72,9 +73,23 @@ pub struct Truth {
     /// Blades.
     pub blades: u8,
     /// Mean speed as the camera sees it in rpm, positive clockwise on the screen.
+    #[serde(rename = "rpm_camera_mean_signed")]
     pub rpm_camera: f64,
     /// Mean speed relative to the room in rpm, same sign.
+    #[serde(rename = "rpm_room_mean_signed")]
     pub rpm_room: f64,
+}
+
+impl From<&RotorTruth> for Truth {
+    fn from(rotor: &RotorTruth) -> Self {
+        Self {
+            centre_px: rotor.centre_px,
+            radius_px: rotor.radius_px,
+            blades: rotor.blades,
+            rpm_camera: rotor.rpm_camera_mean_signed,
+            rpm_room: rotor.rpm_room_mean_signed,
+        }
+    }
 }
 
 /// Pairs every true rotor with the measured one nearest to its centre, not farther than half its radius.

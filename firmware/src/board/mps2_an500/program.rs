@@ -16,7 +16,7 @@ use evtach_firmware::intake::{Block, Pace};
 use evtach_firmware::kept::KeptFault;
 use evtach_firmware::measure::measure;
 use evtach_firmware::recorder::Recorder;
-use evtach_firmware::scpi::{RecorderFailed, RecorderState, RecorderStatus};
+use evtach_firmware::scpi::{RecorderFailed, RecorderStatus};
 use evtach_firmware::sensor::spi::{Acquired, AlwaysReady, Flash, SpiSensor, acquire};
 use evtach_firmware::settings::Store;
 use evtach_firmware::tasks::{self, Front, Measuring, Recording, Shared, Task};
@@ -51,18 +51,7 @@ impl Tape {
 
 impl Recording for Tape {
     fn status(&self) -> RecorderStatus {
-        Self::with(|recorder| RecorderStatus {
-            state: if recorder.is_running() {
-                RecorderState::Running
-            } else if recorder.is_full() {
-                RecorderState::Full
-            } else {
-                RecorderState::Idle
-            },
-            events: recorder.events(),
-            capacity: recorder.capacity(),
-        })
-        .unwrap_or_default()
+        Self::with(|recorder| RecorderStatus::from(&*recorder)).unwrap_or_default()
     }
 
     fn start(&mut self, geometry: Geometry, events: u32) {
