@@ -70,12 +70,11 @@ impl PowerSupply {
             }
             // Something is there to be lost, and the second word of what follows it is cut in its midst.
             Injection::PowerCut => {
-                block_on(
-                    Store::new(&mut *flash, 0, PREFERENCES_BYTES as u32)
-                        .save(&Preferences::default()),
-                )
-                .ok();
+                let mut store = Store::new(Self(flash), 0, PREFERENCES_BYTES as u32);
+                block_on(store.save(&Preferences::default())).ok();
+                let Self(flash) = store.release();
                 flash.cut_power(1, 100);
+                return Self(flash);
             }
             Injection::None | Injection::Panic(_) | Injection::Hang(_) => {}
         }
