@@ -1,6 +1,7 @@
 //! The measurement of one rotor in one window, step by step: the paper's stages and the lock beyond them.
 
 mod baselines;
+mod doubt;
 mod verdict;
 
 use super::baseline::{Estimate, Pairs};
@@ -16,13 +17,12 @@ use crate::registration::Icp;
 use crate::rotors::{Disc, Found};
 use crate::store::{WINDOW_SEGMENTS, Window};
 use baselines::{REFINEMENT_PAIRS, REFINEMENT_PERIODS};
+use doubt::{DOUBTFUL, Doubt};
 
 /// Steps of centre and speed by the polar phase.
 const NEWTON_STEPS: u8 = 6;
 /// Relative error of the speed of a rotor that is followed from window to window.
 const FOLLOWING_SIGMA: f32 = 1e-3;
-/// A rotor keeps at least this share of its events in step.
-const LEAST_COHERENCE: f32 = 0.3;
 /// Share in step of the second best harmonic over that of the best: beyond this the pattern stands, or the centre is off.
 const MOST_STANDING: f32 = 0.8;
 /// Two coarse speeds contradict each other when they differ by more than half the way to the next speed that the line
@@ -30,12 +30,6 @@ const MOST_STANDING: f32 = 0.8;
 /// slices falls short of the turn by up to a tenth.
 const COARSE_AGREEMENT: f32 = 0.15;
 const MOST_COARSE_AGREEMENT: f32 = 0.25;
-/// Blur of the rotor's edges, as a share of its radius and in pixels for a small one, beyond which they are no edges;
-/// and within which they are so sharp that a registration that went astray does not count against them.
-const MOST_BLUR: (f32, f32) = (0.1, 1.5);
-const LEAST_BLUR: (f32, f32) = (0.06, 1.3);
-/// What the jitter of the events in dim light may add to it.
-const MOST_JITTER_S: f32 = 150e-6;
 /// Two harmonics of one line differ by a fifteenth or more.
 const SCAN_AGREEMENT: f32 = 0.04;
 /// Fewest events of a rotor that are measured.
@@ -71,6 +65,7 @@ enum Stage {
     #[default]
     Newton,
     Scan,
+    Doubt,
     Symmetry,
     Pose,
     Initial,
@@ -104,6 +99,8 @@ pub struct Measurement {
     follows: bool,
     /// Whether the scan has already sent the measurement back once.
     second_look: bool,
+    /// Looks about the centre for a harmonic that keeps step better.
+    doubt: Option<Doubt>,
     disc: Disc,
     omega_rad_s: f32,
     /// Angular harmonic whose phase is followed.
@@ -139,6 +136,7 @@ impl Measurement {
             turn: 0,
             follows: false,
             second_look: false,
+            doubt: None,
             disc: found.disc,
             omega_rad_s: found.omega_rad_s,
             harmonic: found.windings,
@@ -186,6 +184,7 @@ impl Measurement {
         match self.stage {
             Stage::Newton => self.newton(window, polar),
             Stage::Scan => self.scan(polar),
+            Stage::Doubt => self.doubt(window, polar),
             Stage::Symmetry => self.symmetry(stated, polar),
             Stage::Pose => self.pose(window, sums),
             Stage::Initial => self.initial(window, icp),
@@ -207,7 +206,7 @@ impl Measurement {
     pub const fn stage(&self) -> &'static str {
         match self.stage {
             Stage::Newton => "centre",
-            Stage::Scan => "scan",
+            Stage::Scan | Stage::Doubt => "scan",
             Stage::Symmetry => "symmetry",
             Stage::Pose => "pose",
             Stage::Initial => "initial",
@@ -244,7 +243,7 @@ impl Measurement {
         let coherence =
             Pattern::learn(polar, self.disc, self.omega_rad_s, self.harmonic).coherence();
         self.evidence.coherence = Some(coherence);
-        if coherence < LEAST_COHERENCE {
+        if coherence < self.least_coherence() {
             return self.refuse(Reason::NoRotation);
         }
         self.stage = Stage::Scan;
@@ -270,6 +269,11 @@ impl Measurement {
         self.evidence.scan_standing = Some(standing);
         if scan.best == 0 {
             return self.refuse(Reason::NoRotation);
+        }
+        if standing > DOUBTFUL && self.doubt.is_none() {
+            self.doubt = Some(Doubt::new(self.disc, line_hz));
+            self.stage = Stage::Doubt;
+            return;
         }
         let omega_rad_s = line_hz * TAU / scan.best as f32;
         if (omega_rad_s - self.omega_rad_s).abs() > SCAN_AGREEMENT * omega_rad_s.abs() {
@@ -344,7 +348,7 @@ impl Measurement {
                 self.alpha_rad_s2 = Some(found.alpha_rad_s2);
             }
         }
-        if !self.sharp(MOST_BLUR) {
+        if !self.has_edges() {
             return self.refuse(Reason::Ambiguous);
         }
         if !self.follows {
@@ -352,19 +356,12 @@ impl Measurement {
             return;
         }
         self.evidence.coherence = Some(self.pose.first_coherence());
-        if self.pose.first_coherence() < LEAST_COHERENCE {
+        if self.pose.first_coherence() < self.least_coherence() {
             return self.refuse(Reason::NoRotation);
         }
         self.count_periods(window);
         self.plan_lock(window, self.omega_rad_s.abs() * FOLLOWING_SIGMA);
         self.stage = Stage::Lock;
-    }
-
-    /// Whether the rotor's edges are at least so sharp.
-    fn sharp(&self, (share, px): (f32, f32)) -> bool {
-        let radius_px = self.disc.radius_px;
-        let jitter_px = 0.5 * radius_px * self.omega_rad_s.abs() * MOST_JITTER_S;
-        self.pose.sharpness_px() < (share * radius_px).max(px) + jitter_px
     }
 
     /// One Newton step of centre and speed; `false` when the phase gives none.
@@ -407,7 +404,7 @@ impl Measurement {
             .evidence
             .initial_rad_s
             .is_some_and(|initial| (initial - self.omega_rad_s).abs() < agreement);
-        if !agrees && !self.sharp(LEAST_BLUR) {
+        if !agrees && !self.sharp() {
             return self.refuse(Reason::Ambiguous);
         }
         let periods = self.count_periods(window);

@@ -39,6 +39,8 @@ const FOLDED_PERIODS: usize = 3;
 const MOST_HARMONIC: u32 = 96;
 /// A doubled harmonic must keep this share of the events in step that were so at first.
 const SHARP_COHERENCE: f32 = 0.5;
+/// Share of the events in step that edges as sharp as can be seen leave there.
+const SEEN_COHERENCE: f32 = 0.75;
 /// Blocks over which the wandering of the axis is judged.
 const DRIFT_BLOCKS: usize = 12;
 /// Blocks of the path at first, and once these fit.
@@ -195,6 +197,34 @@ impl Pose {
     #[must_use]
     pub fn sharpness_px(&self) -> f32 {
         0.5 * self.disc.radius_px / (self.harmonic as f32 * self.coherence.max(LEAST_SHARE))
+    }
+
+    /// The same for those events that kept step when the rotor was found, where a harmonic twice as high or more shows edges
+    /// at all: noise, a lamp and a background among the rotor's events are not blur. Pixels at the rim's half.
+    #[must_use]
+    pub fn blur_px(&self) -> f32 {
+        if self.has_overtone() {
+            self.sharpness_px() * self.first_coherence.max(self.coherence)
+        } else {
+            self.sharpness_px()
+        }
+    }
+
+    /// Blur in pixels half-way to the rim below which edges could not be seen, where parts differ and the harmonic rose as
+    /// far as it may; 0 where it may rise further.
+    #[must_use]
+    pub fn least_blur_px(&self) -> f32 {
+        if self.has_overtone() && self.harmonic == self.most_harmonic {
+            0.5 * self.disc.radius_px / (SEEN_COHERENCE * self.harmonic as f32)
+        } else {
+            0.0
+        }
+    }
+
+    /// Whether twice the harmonic that the rotor was found by keeps step too.
+    #[must_use]
+    pub const fn has_overtone(&self) -> bool {
+        self.harmonic > self.first_harmonic
     }
 
     /// Rotor's events in the window.

@@ -24,6 +24,8 @@ const WINDOWS_US: [u32; 9] = [
 ];
 /// Segments by which the window moves on from reading to reading: 50 ms of 150.
 const HOP_SEGMENTS: usize = 2;
+/// Readings until the whole image is searched again, while a rotor is in view that is not locked.
+const SEARCH_AGAIN: u8 = 2;
 /// Fewest events in a window that are looked at.
 const LEAST_EVENTS: u64 = 300;
 /// Share of events lost beyond which the rest is not trusted.
@@ -75,6 +77,9 @@ impl Tachometer<'_> {
         self.window_segments = 0;
         self.job = Job::Idle;
         self.satisfied = status == Status::Locked;
+        if self.outcomes.iter().any(|outcome| outcome.status != Status::Locked) {
+            self.until_search = self.until_search.min(SEARCH_AGAIN);
+        }
         if self.overrun {
             // There is a hole behind what is stored. What is known of the rotors still holds.
             let until_search = self.until_search;
@@ -91,6 +96,8 @@ impl Tachometer<'_> {
             let longer = WINDOWS_US.iter().find(|w| **w as f32 >= wanted);
             self.target_us = longer.copied().unwrap_or(LONGEST_WINDOW_US);
             self.store.lengthen(segment_us(self.target_us));
+            // It is longer for a rotor that is not locked, and only those are followed.
+            self.until_search = 0;
         } else if status.reason().is_some() && adapts {
             // Nothing even in the longest window: begin again with a short one.
             self.restart(self.last_us);
