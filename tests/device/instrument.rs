@@ -230,7 +230,7 @@ fn a_channel_that_is_full_is_saturation_on_screen_and_link() {
     }
     let rotor = Rotor { rpm: 2400.0, radius_px: 20.0, blades: 2, ..Rotor::default() };
     let loaded =
-        synthesise(&Scene { rotors: vec![rotor], duration_ms: 15_000.0, ..Scene::default() });
+        synthesise(&Scene { rotors: vec![rotor], duration_ms: 8_000.0, ..Scene::default() });
     let image = device::build().expect("the firmware builds");
     let mut session =
         Session::start(&image, Some(&stream(&loaded)), &["full"]).expect("the firmware runs");
