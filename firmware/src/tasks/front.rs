@@ -109,7 +109,7 @@ impl<R: Recording, P: Panel> Front<R, P> {
         let lost = acquired.account.lost.total().saturating_add(acquired.overrun);
         self.instrument.tick(
             self.reached.0.saturating_add(since.as_micros()),
-            Traffic { events: acquired.account.received, lost },
+            Traffic { events: acquired.account.received.saturating_sub(acquired.overrun), lost },
         );
         while let Ok(reading) = self.shared.readings.try_receive() {
             self.instrument.observe(&reading);

@@ -140,12 +140,17 @@ pub async fn measure_task(
 ) {
     let record = |block: &Block| {
         // A memory that fails ends the recording, and the link says so.
-        Tape::with(|recorder| recorder.push(block.t_us, &block.records).ok());
+        Tape::with(|recorder| recorder.push(block.t_us, block.events()).ok());
     };
     let mut measuring = Measuring::new(&SHARED, record);
     let mut costs = Costs::new(Ticks);
     let measuring = measure(tachometer, &mut blocks, Pace::Replay, &mut costs, &mut measuring);
     counted(User::Measure, select(measuring, injection.strike("measure"))).await;
+    loop {
+        // Only where the channel of blocks is to fill up: alive, but taking none.
+        SHARED.alive(Task::Measure);
+        Timer::after_millis(250).await;
+    }
 }
 
 /// Screen, link and keeping the preferences: one task, so that they share the front.

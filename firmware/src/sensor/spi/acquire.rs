@@ -14,8 +14,7 @@ use super::driver::{LinkError, SILENCE, SpiSensor};
 use super::frame::{Hello, Kind};
 use super::parser::Frame;
 use super::words::Words;
-use crate::intake::{BLOCK_EVENTS, BLOCKS, Block, Pace};
-use crate::record;
+use crate::intake::{BLOCKS, Block, Pace};
 
 /// Reads without a sound frame after which a recording is held to be over: about 64 KiB.
 const SILENT_READS: u32 = 32;
@@ -24,8 +23,11 @@ const SILENT_READS: u32 = 32;
 /// processor busy.
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// After every read, acquiring rests for so much of the time that it took: a fifth in all.
+/// Acquiring rests for a [`PAUSE`] over this after each: a fifth of the time in all. More often would cost more than it gives.
 const SHARE: u32 = 4;
+
+/// How far ahead of its time a recording may play: a timer for every frame costs as much as a tenth of its events.
+const AHEAD: Duration = Duration::from_millis(1);
 
 /// With more blocks than these waiting to be measured, events are thinned further; with fewer than
 /// the second, less.
@@ -109,8 +111,8 @@ pub async fn acquire<D: SpiDevice, R: Wait, M: RawMutex>(
     let mut outlet = Outlet::new(blocks, pace);
     let mut heard = Instant::now();
     let mut silent_reads = 0;
+    let mut rested = Instant::now();
     loop {
-        let begun = Instant::now();
         match sensor.read().await {
             Ok(()) => silent_reads += 1,
             Err(error) if pace.is_endless() => outlet.failed(&error),
@@ -131,9 +133,10 @@ pub async fn acquire<D: SpiDevice, R: Wait, M: RawMutex>(
                 outlet.acquired.sensor = None;
             }
             Timer::after(PAUSE).await;
-        } else if pace.is_endless() {
+        } else if pace.is_endless() && rested.elapsed() > PAUSE {
             // However much comes, those below get their share: the bridge drops what is not fetched, and counts it.
-            Timer::after(begun.elapsed().min(PAUSE) / SHARE).await;
+            Timer::after(PAUSE / SHARE).await;
+            rested = Instant::now();
         }
         told(&outlet.acquired);
     }
@@ -206,7 +209,10 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
         if self.pace.is_timed() {
             let (start, first_us) = *self.origin.get_or_insert_with(|| (Instant::now(), t_us));
             let due = start.checked_add(Duration::from_micros(t_us.saturating_sub(first_us)));
-            Timer::at(due.unwrap_or(Instant::MAX)).await;
+            let due = due.unwrap_or(Instant::MAX);
+            if due.saturating_duration_since(Instant::now()) > AHEAD {
+                Timer::at(due).await;
+            }
         }
     }
 
@@ -228,27 +234,27 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
                 self.lost += u64::from(events - before);
                 break;
             };
-            slot.records.clear();
-            let mask = (1 << self.stride_log2) - 1;
+            slot.clear();
             while !words.is_done() {
-                let room = BLOCK_EVENTS - slot.records.len();
+                let room = slot.space().len();
                 if room < words.most_events_a_word() {
                     break;
                 }
-                words.decode(room / words.most_events_a_word(), |event| {
-                    events += 1;
-                    self.phase = self.phase.wrapping_add(1);
-                    if self.phase & mask != 0 {
-                        self.acquired.thinned += 1;
-                        return;
-                    }
-                    if slot.records.is_empty() {
-                        slot.t_us = event.t_us;
-                    }
-                    slot.records.push(record::encode(&event)).ok();
-                });
+                let (before, count) = (slot.events().len(), words.pack(slot.space()));
+                slot.filled(count);
+                events += count as u32;
+                if self.stride_log2 > 0 {
+                    let mask = (1 << self.stride_log2) - 1;
+                    let phase = &mut self.phase;
+                    let went = slot.retain(before, || {
+                        *phase = phase.wrapping_add(1);
+                        *phase & mask == 0
+                    });
+                    self.acquired.thinned += went as u64;
+                }
             }
-            if !slot.records.is_empty() {
+            if let Some(first) = slot.events().first() {
+                slot.t_us = first.unpack(frame.header.t_us).t_us;
                 slot.geometry = geometry;
                 slot.lost = mem::take(&mut self.lost);
                 slot.last = false;
@@ -270,7 +276,7 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
     /// Marks the end of a recording.
     async fn close(&mut self) {
         let slot = self.blocks.send().await;
-        slot.records.clear();
+        slot.clear();
         slot.lost = mem::take(&mut self.lost);
         slot.last = true;
         self.blocks.send_done();

@@ -1,7 +1,7 @@
 //! The events in a frame.
 
-use evtach_core::Event;
 use evtach_core::decode::{Evt2, Evt3};
+use evtach_core::{Event, PackedEvent};
 
 use super::frame::Kind;
 use super::parser::Frame;
@@ -43,12 +43,29 @@ impl<'f> Words<'f> {
         Self { rest: frame.payload, base_us: frame.header.t_us & !(span_us - 1), decoder }
     }
 
-    /// Most events that one of these words stands for.
+    /// Most events that one of these words stands for: with fewer places, [`Words::pack`] does nothing.
     #[must_use]
     pub const fn most_events_a_word(&self) -> usize {
         match self.decoder {
             Decoder::Evt3(_) => VECTOR_EVENTS,
             Decoder::Evt2(_) | Decoder::None => 1,
+        }
+    }
+
+    /// Packs events until the places may not do for another word, and returns how many.
+    pub fn pack(&mut self, places: &mut [PackedEvent]) -> usize {
+        match &mut self.decoder {
+            Decoder::Evt2(decoder) => {
+                // The clock of these words fills the low bits: nothing of the base is in them.
+                let (words, events) = decoder.pack(self.rest.as_chunks().0, places);
+                self.rest = self.rest.get(words * 4..).unwrap_or_default();
+                events
+            }
+            Decoder::Evt3(decoder) => pack_evt3(decoder, &mut self.rest, self.base_us, places),
+            Decoder::None => {
+                self.rest = &[];
+                0
+            }
         }
     }
 
@@ -62,8 +79,9 @@ impl<'f> Words<'f> {
     #[inline]
     pub fn decode(&mut self, words: usize, mut emit: impl FnMut(Event)) {
         let base_us = self.base_us;
+        // Times that no sensor reaches may wrap.
         let mut place =
-            |event: Event| emit(Event { t_us: base_us.saturating_add(event.t_us), ..event });
+            |event: Event| emit(Event { t_us: base_us.wrapping_add(event.t_us), ..event });
         match &mut self.decoder {
             Decoder::Evt2(decoder) => {
                 for word in take(&mut self.rest, words) {
@@ -78,6 +96,26 @@ impl<'f> Words<'f> {
             Decoder::None => self.rest = &[],
         }
     }
+}
+
+/// Packs the events of words as far as the places are sure to do: one word may be several events.
+fn pack_evt3(
+    decoder: &mut Evt3,
+    rest: &mut &[u8],
+    base_us: u64,
+    places: &mut [PackedEvent],
+) -> usize {
+    let words = take(rest, places.len() / VECTOR_EVENTS);
+    let (count, mut places) = (places.len(), places.iter_mut());
+    for word in words {
+        decoder.decode(u16::from_le_bytes(*word), |event| {
+            if let Some(place) = places.next() {
+                *place =
+                    PackedEvent::pack(&Event { t_us: base_us.wrapping_add(event.t_us), ..event });
+            }
+        });
+    }
+    count - places.len()
 }
 
 /// Takes up to `words` words of `N` bytes off the front. A rest shorter than a word does not exist: the
