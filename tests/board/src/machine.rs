@@ -64,6 +64,15 @@ enum Sleep {
     Locked,
 }
 
+/// A power cut to come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Cut {
+    None,
+    /// In the middle of the next write.
+    Writing,
+    At(u64),
+}
+
 /// The engine's memory as another bus master sees it.
 struct Ram<'a>(&'a mut Engine);
 
@@ -104,6 +113,8 @@ pub struct Machine {
     broken_word: Rc<Cell<Option<u32>>>,
     /// Time spent asleep.
     pub slept: u64,
+    /// Power goes in the middle of the next write to the serial flash; then it knows when.
+    cut: Cut,
 }
 
 impl Machine {
@@ -170,6 +181,7 @@ impl Machine {
             entered: 0,
             broken_word,
             slept: 0,
+            cut: Cut::None,
         };
         machine.hook().map_err(failed)?;
         machine.lose_memory();
@@ -298,6 +310,11 @@ impl Machine {
         Ok(())
     }
 
+    /// Power goes in the middle of the next write to the serial flash.
+    pub fn cut_while_writing(&mut self) {
+        self.cut = Cut::Writing;
+    }
+
     /// Time since power first came, in picoseconds.
     pub fn now(&self) -> u64 {
         self.pulse.now.get()
@@ -310,7 +327,8 @@ impl Machine {
     pub fn run_until(&mut self, until: u64) -> Result<()> {
         while self.now() < until {
             self.look_after()?;
-            let due = self.pulse.due.get();
+            let cut = if let Cut::At(at) = self.cut { at } else { NEVER };
+            let due = self.pulse.due.get().min(cut);
             if self.now() >= due {
                 continue;
             }
@@ -333,6 +351,17 @@ impl Machine {
         if self.now() >= self.next_probe {
             self.next_probe = self.now() + PROBE_PS;
             self.drain_log();
+        }
+        match self.cut {
+            Cut::Writing => {
+                let middle = self.board.borrow().quadspi.flash.middle();
+                self.cut = middle.map_or(Cut::Writing, Cut::At);
+            }
+            Cut::At(at) if at <= self.now() => {
+                self.cut = Cut::None;
+                self.board.borrow_mut().power_off();
+            }
+            _ => {}
         }
         let asked = self.board.borrow_mut().asked.take();
         if let Some(cause) = asked {
@@ -410,7 +439,6 @@ impl Machine {
         let from = u64::from(cpu::register(&self.engine, R::PC) | 1);
         let ended = self.engine.emu_start(from, NOWHERE, 0, 0);
         let pc = cpu::register(&self.engine, R::PC);
-        if std::env::var_os("DBG").is_some() { eprintln!("DBG {from:x} -> {pc:x} {:?} {ended:?} sp {:x} lr {:x} ctl {:x} ipsr {:x} xpsr {:x} prim {:x}", self.stop.get(), cpu::register(&self.engine, R::SP), cpu::register(&self.engine, R::LR), cpu::register(&self.engine, R::CONTROL), cpu::register(&self.engine, R::IPSR), cpu::register(&self.engine, R::XPSR), cpu::register(&self.engine, R::PRIMASK)); }
         match (self.stop.get(), ended) {
             (Stop::Plain, Ok(())) => Ok(()),
             (Stop::Wfe(at), _) => {
@@ -492,7 +520,6 @@ impl Machine {
         stack.iter().position(|byte| *byte != first).unwrap_or(stack.len())
     }
 
-    pub fn words(&self, at: u32, n: usize) -> Vec<u32> { (0..n).map(|i| { let mut w=[0;4]; let _ = self.engine.mem_read(u64::from(at)+4*i as u64, &mut w); u32::from_le_bytes(w)}).collect() }
     /// Where the processor is.
     pub fn place(&self) -> String {
         let asleep = match self.sleep {
@@ -501,10 +528,5 @@ impl Machine {
             Sleep::Locked => ", locked up",
         };
         format!("{}{asleep}", self.image.place(cpu::register(&self.engine, R::PC)))
-    }
-
-    /// Nothing is due any more: time would pass for ever.
-    pub fn is_dead(&self) -> bool {
-        self.sleep != Sleep::Awake && self.pulse.due.get() == NEVER
     }
 }

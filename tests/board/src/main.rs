@@ -12,21 +12,44 @@ mod board;
 mod chip;
 mod cpu;
 mod image;
+mod live;
 mod machine;
 mod rtt;
+mod script;
 mod time;
 mod usb;
 
-fn main() -> anyhow::Result<()> {
-    let path = std::env::args().nth(1).unwrap_or_default();
-    let image = image::Image::read(path.as_ref())?;
-    let mut machine = machine::Machine::new(image)?;
-    for step in 1..=20 {
-        machine.run_until(step * 100 * time::MS)?;
-        println!("{} {}", machine.now() / time::MS, machine.place());
-        for line in machine.rtt.lines.drain(..) { println!("{line}"); }
-        if let Some(at) = machine.image.symbol("LOG") { println!("{:x?}", machine.words(at, 16)); }
-        for line in machine.faults.drain(..) { println!("{line}"); }
+use std::io::{BufRead as _, Write as _, stdin, stdout};
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Parser;
+
+/// Runs a firmware image on an emulated STM32F746G-DISCO.
+#[derive(Parser)]
+#[command(version, about, after_help = "Lines on stdin say what is done with the device; see src/script.rs.")]
+struct Args {
+    /// The image, as it is flashed.
+    image: PathBuf,
+    /// In real time, with the serial port on a pseudo-terminal, the log on stderr, and the screen in this file.
+    #[arg(long, value_name = "FILE.png")]
+    live: Option<PathBuf>,
+}
+
+fn main() -> Result<()> {
+    let args = Args::parse();
+    let machine = machine::Machine::new(image::Image::read(&args.image)?)?;
+    let mut script = script::Script::new(machine);
+    if let Some(screen) = args.live {
+        return live::run(script, &screen);
+    }
+    for line in stdin().lock().lines() {
+        let answer = match script.line(&line?) {
+            Ok(answer) => format!("ok {answer}"),
+            Err(error) => format!("error {}", format!("{error:#}").replace('\n', " ")),
+        };
+        writeln!(stdout(), "{}", answer.trim_end())?;
+        stdout().flush()?;
     }
     Ok(())
 }

@@ -369,6 +369,12 @@ impl Board {
         self.settle();
     }
 
+    /// Looks again at the host port, after a plug was pulled.
+    pub fn host_disturbed(&mut self) {
+        self.host.lines(&mut self.nvic);
+        self.settle();
+    }
+
     fn drive(&mut self, (port, pin): (u8, u8), high: bool) {
         if self.gpio[usize::from(port)].drive(pin, high) {
             self.exti.edge(port, pin, high);

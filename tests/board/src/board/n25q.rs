@@ -232,9 +232,9 @@ impl N25q {
         }
     }
 
-    /// Whether a change is under way.
-    pub fn is_busy(&self) -> bool {
-        self.working.is_some()
+    /// The middle of the change under way.
+    pub fn middle(&self) -> Option<u64> {
+        self.working.as_ref().map(|(_, began, ends)| began + (ends - began) / 2)
     }
 }
 
@@ -285,6 +285,6 @@ mod tests {
         program(&mut flash, 0, &[0; 100], 0);
         flash.power_off(PROGRAM_PS / 2);
         assert_eq!((flash.cells[49], flash.cells[50], flash.cells[51]), (0, 0x55, 0xff));
-        assert!(!flash.is_busy());
+        assert_eq!(flash.middle(), None);
     }
 }
