@@ -34,6 +34,9 @@ pub trait Recording {
 pub trait Panel: DrawTarget<Color = Rgb565> {
     /// The pixels, row by row, two bytes each, little-endian.
     fn bytes(&self) -> &[u8];
+
+    /// A drawing is complete: a panel that is drawn on unseen shows it now.
+    fn present(&mut self) {}
 }
 
 /// The front of the device: what a person sees and asks, on the screen and over the link.

@@ -44,6 +44,7 @@ pub async fn show<R: Recording, P: Panel>(
             front.refresh();
             // A panel that fails is drawn whole the next time.
             screen.draw(&mut front.panel, &front.instrument).ok();
+            front.panel.present();
         }
         if shared.all_alive() {
             last_alive = Instant::now();

@@ -30,9 +30,6 @@ pub const STORE_BYTES: usize = size_of::<[StoredEvent; DEVICE_EVENTS]>();
 pub const HEAT_BYTES: usize =
     size_of::<[u16; DEVICE_HEAT_CELLS]>() + size_of::<[u8; DEVICE_HEAT_CELLS]>();
 
-/// Bytes of the blocks between acquiring and measuring.
-pub const BLOCKS_BYTES: usize = size_of::<[Block; BLOCKS]>();
-
 // What the core may take of the 320 KB: the rest is for screen, links and stack.
 const _: () = {
     assert!(TACHOMETER_BYTES + HEAT_BYTES <= 96 * 1024);
