@@ -40,8 +40,10 @@ const SEV: u16 = 0xbf40;
 /// Why the engine came back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stop {
-    /// Time is up, or something wants to be looked at.
+    /// By itself, which it does not.
     Plain,
+    /// Time is up, or something wants to be looked at, before the block at this address.
+    Before(u32),
     /// `wfe` at this address.
     Wfe(u32),
     /// `wfi` at this address.
@@ -192,7 +194,7 @@ impl Machine {
     /// Watches blocks of code, the instructions that the engine does not know, and accesses that go nowhere.
     fn hook(&mut self) -> Result<(), uc_error> {
         let (pulse, image) = (Rc::clone(&self.pulse), Rc::clone(&self.image));
-        let board = Rc::clone(&self.board);
+        let (board, stopped) = (Rc::clone(&self.board), Rc::clone(&self.stop));
         // Bytes and instructions of the block at each halfword of the flash, once it has been met.
         let mut counts: Vec<(u32, u32)> = vec![(0, 0); FLASH_BYTES / 2];
         self.engine.add_block_hook(1, 0, move |engine, at, size| {
@@ -205,6 +207,8 @@ impl Machine {
                         .preempting()
                         .is_some_and(|(_, priority)| cpu::unmasked(engine, priority));
             if stop {
+                // Beside hooks on single instructions the engine leaves the program counter where it was some blocks ago.
+                stopped.set(Stop::Before(at as u32));
                 let _ = engine.emu_stop();
                 return;
             }
@@ -440,7 +444,11 @@ impl Machine {
         let ended = self.engine.emu_start(from, NOWHERE, 0, 0);
         let pc = cpu::register(&self.engine, R::PC);
         match (self.stop.get(), ended) {
-            (Stop::Plain, Ok(())) => Ok(()),
+            (Stop::Plain, Ok(())) => bail!("the engine stopped at {} by itself", self.image.place(pc)),
+            (Stop::Before(at), _) => {
+                cpu::set_register(&mut self.engine, R::PC, at);
+                Ok(())
+            }
             (Stop::Wfe(at), _) => {
                 cpu::set_register(&mut self.engine, R::PC, at + 2);
                 if !self.event.take() {

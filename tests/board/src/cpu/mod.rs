@@ -147,7 +147,7 @@ pub fn leave(engine: &mut Engine, nvic: &mut Nvic, link: u32) -> Result<(), uc_e
     }
     let moved = if xpsr & ALIGNED != 0 { 4 } else { 0 };
     set_register(engine, R::SP, at + 4 * words as u32 + moved);
-    set_register(engine, R::XPSR, xpsr & !(ALIGNED | 0x1ff) | u32::from(nvic.current()));
+    set_register(engine, R::XPSR_NZCVQG, xpsr & !(ALIGNED | 0x1ff) | u32::from(nvic.current()));
     set_register(engine, R::PC, word(6) | 1);
     Ok(())
 }
@@ -163,7 +163,7 @@ pub fn reset(engine: &mut Engine, vtor: u32) -> Result<(), uc_error> {
     for masks in [R::PRIMASK, R::BASEPRI, R::FAULTMASK, R::IPSR, R::CONTROL, R::FPSCR] {
         set_register(engine, masks, 0);
     }
-    set_register(engine, R::XPSR, THUMB);
+    set_register(engine, R::XPSR_NZCVQG, THUMB);
     set_register(engine, R::LR, 0xffff_ffff);
     set_register(engine, R::SP, u32::from_le_bytes([s0, s1, s2, s3]));
     set_register(engine, R::PC, u32::from_le_bytes([p0, p1, p2, p3]));
