@@ -11,7 +11,7 @@ use embassy_stm32::interrupt::{InterruptExt as _, Priority};
 use crate::clock::Source;
 use crate::sdram::{RECORDING, RECORDING_BYTES};
 use crate::tape::{RecordingMemory, Tape};
-use crate::wiring::Board;
+use crate::wiring::AssignedResources;
 use crate::{cache, clock, display, fault, memory, panel, program, sdram, stack, wiring};
 
 static ACQUIRE: InterruptExecutor = InterruptExecutor::new();
@@ -40,7 +40,7 @@ fn main() -> ! {
 
 /// Not inlined: `main` never gives back what its frame takes.
 #[inline(never)]
-fn start(board: Board) -> Result<(), SpawnError> {
+fn start(board: AssignedResources) -> Result<(), SpawnError> {
     if let Err(error) = sdram::start(board.sdram) {
         defmt::error!("{}", defmt::Display2Format(&error));
     }

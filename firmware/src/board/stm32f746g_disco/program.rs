@@ -3,8 +3,6 @@
 use core::cell::RefCell;
 
 use embassy_futures::join::join;
-use embassy_stm32::Peri;
-use embassy_stm32::peripherals::IWDG;
 use embassy_sync::zerocopy_channel::{Receiver, Sender};
 use embassy_time::Timer;
 use evtach_core::Tachometer;
@@ -22,6 +20,7 @@ use crate::memory::Mutex;
 use crate::panel::Panel;
 use crate::tape::Tape;
 use crate::watchdog;
+use crate::wiring::WatchdogParts;
 
 /// What the tasks share.
 pub static SHARED: Shared = Shared::new();
@@ -32,12 +31,12 @@ type SharedFront = RefCell<Front<Tape, Panel>>;
 /// What the front's task begins with.
 pub struct Parts {
     front: &'static mut SharedFront,
-    watchdog: Peri<'static, IWDG>,
+    watchdog: WatchdogParts,
 }
 
 /// Makes the front. Not inlined, because that is built on the stack first.
 #[inline(never)]
-pub fn prepare(panel: Panel, kept: Option<KeptFault>, watchdog: Peri<'static, IWDG>) -> Parts {
+pub fn prepare(panel: Panel, kept: Option<KeptFault>, watchdog: WatchdogParts) -> Parts {
     static FRONT: StaticCell<SharedFront> = StaticCell::new();
     static PICTURE: ConstStaticCell<Picture> = ConstStaticCell::new(Picture::EMPTY);
     SHARED.lend(PICTURE.take());
