@@ -5,7 +5,7 @@ use core::mem;
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_sync::zerocopy_channel::Sender;
 use embassy_time::{Duration, Instant, Timer};
-use evtach_core::Geometry;
+use evtach_core::{Geometry, GyroSample};
 use heapless::Vec;
 
 use crate::record::{Decoder, Header, HeaderError, RECORD_BYTES, Record};
@@ -17,11 +17,16 @@ pub const BLOCK_EVENTS: usize = 128;
 /// of the measurement may take: 0.9 million instructions at 216 MHz.
 pub const BLOCKS: usize = 32;
 
+/// Gyro samples in one block. Sensors take about a thousand a second, and a block is sent when it holds so many.
+pub const BLOCK_GYRO: usize = 2;
+
 /// Events on their way from intake to measurement, still as records: half the memory of events.
 #[derive(Clone, Debug)]
 pub struct Block {
     /// Records in the order in which they came.
     pub records: Vec<Record, BLOCK_EVENTS>,
+    /// Samples of the sensor's gyro that came between these.
+    pub gyro: Vec<GyroSample, BLOCK_GYRO>,
     /// Time of the first in microseconds: a record alone tells only its low 32 bits.
     pub t_us: u64,
     /// Size of the sensor that they come from.
@@ -36,6 +41,7 @@ impl Block {
     /// A block without events.
     pub const EMPTY: Self = Self {
         records: Vec::new(),
+        gyro: Vec::new(),
         t_us: 0,
         // All zeros, so that the blocks need no image in flash.
         geometry: Geometry { width_px: 0, height_px: 0 },
@@ -158,6 +164,7 @@ pub async fn take_in<S: Source, M: RawMutex>(
         let slot = if pace.can_wait() { Some(blocks.send().await) } else { blocks.try_send() };
         if let Some(slot) = slot {
             mem::swap(&mut slot.records, &mut records);
+            slot.gyro.clear();
             slot.t_us = first_us;
             slot.geometry = header.geometry;
             slot.lost = mem::take(&mut lost);
@@ -169,6 +176,7 @@ pub async fn take_in<S: Source, M: RawMutex>(
     }
     let slot = blocks.send().await;
     slot.records.clear();
+    slot.gyro.clear();
     slot.lost = lost;
     slot.last = true;
     blocks.send_done();

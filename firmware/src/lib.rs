@@ -5,7 +5,7 @@
 //! peripherals and interrupts, and nothing else.
 #![no_std]
 
-#[cfg(test)]
+#[cfg(any(test, feature = "emulated-camera"))]
 extern crate std;
 
 pub mod cost;

@@ -34,6 +34,9 @@ impl<C: Clock> Intake<'_, '_, C> {
         let events: Vec<Event, BLOCK_EVENTS> =
             block.records.iter().map(|&record| decoder.decode(record)).collect();
         self.costs.push(self.tachometer, &events);
+        for sample in &block.gyro {
+            self.tachometer.gyro(*sample);
+        }
         self.ended |= block.last;
     }
 }

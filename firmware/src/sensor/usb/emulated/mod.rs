@@ -1,0 +1,9 @@
+//! The other end of the cable, for tests and for the emulated board: cameras that answer as iniVation's do.
+//!
+//! Built with the feature `emulated-camera` or under test, for programs with an allocator; never part of an image.
+
+mod camera;
+mod words;
+
+pub use camera::{Camera, Fault, Filters, Packet, Stalled};
+pub use words::{DavisWords, DvxplorerWords};
