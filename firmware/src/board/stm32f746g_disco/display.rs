@@ -3,7 +3,7 @@
 use embassy_stm32::gpio::{AfType, Flex, Level, Output, OutputType, Speed};
 use embassy_stm32::ltdc::{
     InterruptHandler, Ltdc, LtdcConfiguration, LtdcLayer, LtdcLayerConfig, PixelFormat,
-    PolarityActive, PolarityEdge,
+    PolarityActive, PolarityEdge, RgbColor,
 };
 use embassy_stm32::pac;
 use embassy_stm32::pac::RCC;
@@ -18,9 +18,10 @@ bind_interrupts!(struct Irqs {
     LTDC => InterruptHandler<peripherals::LTDC>;
 });
 
-/// Switches the display on, showing the frame at an address.
+/// Switches the display on, showing the frame at an address; with these colours its pixels are numbers of them, without
+/// they are 16 bits.
 #[inline(never)]
-pub fn start(p: DisplayPins, frame: usize) {
+pub fn start(p: DisplayPins, frame: usize, colours: Option<&[RgbColor; 256]>) {
     let mut ltdc = Ltdc::new_with_pins(
         p.ltdc, Irqs, p.clock, p.hsync, p.vsync, p.b0, p.b1, p.b2, p.b3, p.b4, p.b5, p.b6, p.b7,
         p.g0, p.g1, p.g2, p.g3, p.g4, p.g5, p.g6, p.g7, p.r0, p.r1, p.r2, p.r3, p.r4, p.r5, p.r6,
@@ -48,13 +49,13 @@ pub fn start(p: DisplayPins, frame: usize) {
     ltdc.init_layer(
         &LtdcLayerConfig {
             layer: LtdcLayer::Layer1,
-            pixel_format: PixelFormat::RGB565,
+            pixel_format: if colours.is_some() { PixelFormat::L8 } else { PixelFormat::RGB565 },
             window_x0: 0,
             window_x1: WIDTH as u16,
             window_y0: 0,
             window_y1: HEIGHT as u16,
         },
-        None,
+        colours.map(<[_; 256]>::as_slice),
     );
     pac::LTDC.layer(0).cfbar().write(|address| address.set_cfbadd(frame as u32));
     pac::LTDC.srcr().write(|reload| reload.set_imr(Imr::RELOAD));

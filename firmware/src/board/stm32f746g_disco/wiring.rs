@@ -41,6 +41,13 @@ assign_resources! {
         // High: the board does not feed this port; it is the device here.
         feed: PD5,
     }
+    // The PHY outside of the chip, a USB3320C.
+    host: HostPins {
+        otg: USB_OTG_HS,
+        clock: PA5,
+        d0: PA3, d1: PB0, d2: PB1, d3: PB10, d4: PB11, d5: PB12, d6: PB13, d7: PB5,
+        stop: PC0, direction: PC2, next: PH4,
+    }
     watchdog: WatchdogParts {
         iwdg: IWDG,
     }
