@@ -13,7 +13,8 @@ pub type Mutex = CriticalSectionRawMutex;
 static BUFFERS: ConstStaticCell<[Block; BLOCKS]> =
     ConstStaticCell::new([const { Block::EMPTY }; BLOCKS]);
 static CHANNEL: StaticCell<Channel<'_, Mutex, Block>> = StaticCell::new();
-static STORE: StaticCell<[StoredEvent; DEVICE_EVENTS]> = StaticCell::new();
+/// The store, or, where nothing can be measured, what a board makes of it.
+pub static STORE: StaticCell<[StoredEvent; DEVICE_EVENTS]> = StaticCell::new();
 static HEAT: ConstStaticCell<[u16; DEVICE_HEAT_CELLS]> =
     ConstStaticCell::new([0; DEVICE_HEAT_CELLS]);
 static WEIGHTS: ConstStaticCell<[u8; DEVICE_HEAT_CELLS]> =

@@ -1,11 +1,12 @@
 //! The instrument: acquire, measure, show, answer, for good.
 
-use core::cell::RefCell;
+use core::cell::{Cell, RefCell};
 use core::fmt::Write as _;
 
 use embassy_futures::block_on;
 use embassy_futures::join::join3;
 use embassy_futures::select::select;
+use embassy_sync::blocking_mutex::Mutex as BlockingMutex;
 use embassy_sync::zerocopy_channel::{Receiver, Sender};
 use embassy_time::Timer;
 use evtach_core::Tachometer;
@@ -34,6 +35,10 @@ use crate::{stack, watchdog};
 
 /// What the tasks share.
 pub static SHARED: Shared = Shared::new();
+
+/// What became of the events, for the report.
+static ACQUIRED: BlockingMutex<Mutex, Cell<Acquired>> =
+    BlockingMutex::new(Cell::new(Acquired::NONE));
 
 /// What the front begins with.
 pub struct Parts {
@@ -77,7 +82,7 @@ pub async fn report_task(seconds: u32) {
         writeln!(console, "used ticks={} name={name}", after - before).ok();
     }
     let (starting, running) = stack::depths();
-    let acquired = SHARED.acquired();
+    let acquired = ACQUIRED.lock(Cell::get);
     writeln!(
         console,
         "{acquired}\nran seconds={seconds} stack_starting={starting} stack_running={running}"
@@ -94,7 +99,10 @@ pub async fn acquire_task(mut blocks: Sender<'static, Mutex, Block>, injection: 
         Err(error) => fail(error),
     };
     let mut sensor = SpiSensor::new(flash, AlwaysReady);
-    let told = |acquired: &Acquired| SHARED.tell_acquired(acquired);
+    let told = |acquired: &Acquired| {
+        ACQUIRED.lock(|cell| cell.set(*acquired));
+        SHARED.tell(acquired.into());
+    };
     let acquiring = acquire(&mut sensor, Pace::Replay, &mut blocks, told);
     counted(User::Acquire, select(acquiring, injection.strike("acquire"))).await;
 }

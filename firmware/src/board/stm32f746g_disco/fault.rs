@@ -57,6 +57,12 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     }
 }
 
+/// The crystal has stopped: the chip goes on at its own clock, and nothing that is measured counts.
+#[exception]
+unsafe fn NonMaskableInt() {
+    stop(Fault::Crystal, "the 25 MHz from X2 stopped");
+}
+
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
     // The stack may be what failed: begin it anew, since nothing is returned to.

@@ -13,14 +13,24 @@ mod display;
 #[cfg(target_os = "none")]
 mod fault;
 #[cfg(target_os = "none")]
+mod flash;
+#[cfg(target_os = "none")]
+mod input;
+#[cfg(target_os = "none")]
 #[path = "../memory.rs"]
 mod memory;
 #[cfg(target_os = "none")]
+mod otg_hs;
+#[cfg(target_os = "none")]
 mod panel;
+#[cfg(target_os = "none")]
+mod port;
 #[cfg(target_os = "none")]
 mod program;
 #[cfg(target_os = "none")]
 mod sdram;
+#[cfg(target_os = "none")]
+mod spare;
 #[cfg(target_os = "none")]
 #[path = "../stack.rs"]
 mod stack;

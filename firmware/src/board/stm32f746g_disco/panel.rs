@@ -1,4 +1,5 @@
-//! The two frames in SDRAM as the screen: one is drawn on while the other is shown.
+//! What is drawn on: the two frames in SDRAM, one shown while the other is drawn on, or, where that memory fails, the
+//! [`Spare`].
 #![expect(unsafe_code, reason = "memory at fixed addresses, handed out once")]
 
 use core::convert::Infallible;
@@ -13,6 +14,7 @@ use evtach_firmware::tasks;
 
 use crate::display;
 use crate::sdram::{FRAME_BYTES, FRAMES};
+use crate::spare::Spare;
 
 /// Pixels across.
 pub const WIDTH: usize = 480;
@@ -29,7 +31,15 @@ const _: () = assert!(size_of::<Frame>() <= FRAME_BYTES);
 const LOOKS: u32 = 1_000_000;
 
 /// The screen.
-pub struct Panel {
+pub enum Panel {
+    /// As it should be.
+    Frames(Frames),
+    /// Without SDRAM.
+    Spare(Spare),
+}
+
+/// Two frames.
+pub struct Frames {
     back: &'static mut Frame,
     front: &'static mut Frame,
     /// Rows drawn since the frames were exchanged.
@@ -39,7 +49,7 @@ pub struct Panel {
 }
 
 /// Makes both frames black; `None` the second time. The SDRAM must have been started.
-pub fn take() -> Option<Panel> {
+pub fn frames() -> Option<Frames> {
     static TAKEN: AtomicBool = AtomicBool::new(false);
     if TAKEN.swap(true, Ordering::Relaxed) {
         return None;
@@ -52,10 +62,10 @@ pub fn take() -> Option<Panel> {
         back.write_bytes(0, 1);
         (&mut *front, &mut *back)
     };
-    Some(Panel { back, front, drawn: 0..0, stale: 0..0 })
+    Some(Frames { back, front, drawn: 0..0, stale: 0..0 })
 }
 
-impl Panel {
+impl Frames {
     /// Where the frame lies that is shown.
     pub fn address(&self) -> usize {
         ptr::from_ref(&*self.front).addr()
@@ -81,13 +91,13 @@ impl Panel {
     }
 }
 
-impl OriginDimensions for Panel {
+impl OriginDimensions for Frames {
     fn size(&self) -> Size {
         Size::new(WIDTH as u32, HEIGHT as u32)
     }
 }
 
-impl DrawTarget for Panel {
+impl DrawTarget for Frames {
     type Color = Rgb565;
     type Error = Infallible;
 
@@ -98,9 +108,7 @@ impl DrawTarget for Panel {
         for Pixel(Point { x, y }, colour) in pixels {
             let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { continue };
             if x < WIDTH && y < HEIGHT {
-                for row in self.rows(y..y + 1) {
-                    row[x] = colour.into_storage().to_le_bytes();
-                }
+                self.rows(y..y + 1)[0][x] = colour.into_storage().to_le_bytes();
             }
         }
         Ok(())
@@ -116,18 +124,51 @@ impl DrawTarget for Panel {
     }
 }
 
+impl OriginDimensions for Panel {
+    fn size(&self) -> Size {
+        Size::new(WIDTH as u32, HEIGHT as u32)
+    }
+}
+
+impl DrawTarget for Panel {
+    type Color = Rgb565;
+    type Error = Infallible;
+
+    fn draw_iter<I>(&mut self, pixels: I) -> Result<(), Infallible>
+    where
+        I: IntoIterator<Item = Pixel<Rgb565>>,
+    {
+        match self {
+            Self::Frames(frames) => frames.draw_iter(pixels),
+            Self::Spare(spare) => spare.draw_iter(pixels),
+        }
+    }
+
+    fn fill_solid(&mut self, area: &Rectangle, colour: Rgb565) -> Result<(), Infallible> {
+        match self {
+            Self::Frames(frames) => frames.fill_solid(area, colour),
+            Self::Spare(spare) => spare.fill_solid(area, colour),
+        }
+    }
+}
+
 impl tasks::Panel for Panel {
     fn bytes(&self) -> &[u8] {
-        self.front.as_flattened().as_flattened()
+        match self {
+            Self::Frames(frames) => frames.front.as_flattened().as_flattened(),
+            Self::Spare(_) => &[],
+        }
     }
 
     fn present(&mut self) {
-        if !self.drawn.is_empty() {
-            core::mem::swap(&mut self.front, &mut self.back);
-            self.stale = core::mem::take(&mut self.drawn);
+        if let Self::Frames(frames) = self
+            && !frames.drawn.is_empty()
+        {
+            core::mem::swap(&mut frames.front, &mut frames.back);
+            frames.stale = core::mem::take(&mut frames.drawn);
             // What was drawn must have arrived before the display reads it.
             cortex_m::asm::dsb();
-            display::show(self.address());
+            display::show(frames.address());
         }
     }
 }

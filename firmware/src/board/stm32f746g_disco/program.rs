@@ -2,57 +2,90 @@
 
 use core::cell::RefCell;
 
-use embassy_futures::join::join;
-use embassy_stm32::Peri;
-use embassy_stm32::peripherals::IWDG;
+use embassy_futures::join::{join3, join5};
+use embassy_stm32::uid::uid_hex;
 use embassy_sync::zerocopy_channel::{Receiver, Sender};
-use embassy_time::Timer;
+use embassy_time::{Duration, Timer};
+use embassy_usb_host::BusState;
 use evtach_core::Tachometer;
 use evtach_firmware::cost::Costs;
-use evtach_firmware::instrument::{Fault, Picture, Preferences};
+use evtach_firmware::instrument::{Fault, Picture, Preferences, SATURATION_EV_S};
 use evtach_firmware::intake::{Block, Pace};
 use evtach_firmware::kept::KeptFault;
 use evtach_firmware::measure::measure;
-use evtach_firmware::sensor::spi::Acquired;
+use evtach_firmware::sensor::spi::{self, AlwaysReady, SpiSensor};
+use evtach_firmware::sensor::usb;
+use evtach_firmware::settings::Store;
 use evtach_firmware::tasks::{self, Front, Measuring, Shared, Task};
+use evtach_firmware::ui::Screen;
 use static_cell::{ConstStaticCell, StaticCell};
 
-use crate::fault;
+use crate::flash::{self, Replay, SharedFlash};
 use crate::memory::Mutex;
+use crate::otg_hs::Host;
 use crate::panel::Panel;
 use crate::tape::Tape;
-use crate::watchdog;
+use crate::wiring::{InputPins, PortPins, WatchdogParts};
+use crate::{fault, input, port, watchdog};
 
 /// What the tasks share.
-pub static SHARED: Shared = Shared::new();
+static SHARED: Shared = Shared::new();
 
-/// The front, which screen and link share.
-type SharedFront = RefCell<Front<Tape, Panel>>;
+/// The front, which screen, link, touch and button share.
+pub type SharedFront = RefCell<Front<Tape, Panel>>;
+
+/// Time between two drawings of a device that does not measure.
+const DEAD_FRAME: Duration = Duration::from_millis(250);
 
 /// What the front's task begins with.
 pub struct Parts {
-    front: &'static mut SharedFront,
-    watchdog: Peri<'static, IWDG>,
+    pub panel: Panel,
+    pub port: PortPins,
+    pub watchdog: WatchdogParts,
+}
+
+/// What the front shows.
+pub enum Shows {
+    /// An instrument, and what happened before this start.
+    Instrument { kept: Option<KeptFault>, flash: &'static SharedFlash, input: InputPins },
+    /// Why nothing can be measured.
+    Dead(KeptFault),
 }
 
 /// Makes the front. Not inlined, because that is built on the stack first.
 #[inline(never)]
-pub fn prepare(panel: Panel, kept: Option<KeptFault>, watchdog: Peri<'static, IWDG>) -> Parts {
+fn front(panel: Panel, preferences: Preferences, kept: Option<KeptFault>) -> &'static SharedFront {
     static FRONT: StaticCell<SharedFront> = StaticCell::new();
     static PICTURE: ConstStaticCell<Picture> = ConstStaticCell::new(Picture::EMPTY);
     SHARED.lend(PICTURE.take());
-    let serial = embassy_stm32::uid::uid_hex();
-    let front = FRONT.init_with(|| {
-        RefCell::new(Front::new(&SHARED, Preferences::default(), kept, Tape, panel, serial))
-    });
-    Parts { front, watchdog }
+    FRONT.init_with(|| {
+        RefCell::new(Front::new(&SHARED, preferences, kept, Tape, panel, uid_hex()))
+    })
 }
 
+/// Where events come from.
+pub enum Source {
+    /// Whatever camera is in the USB host port.
+    Camera(Host),
+    /// The recording in the serial flash, for bring-up with no camera.
+    Replay(&'static SharedFlash),
+}
+
+/// Reads the sensor. One task for both, so that they share its memory.
 #[embassy_executor::task]
-pub async fn acquire_task(_blocks: Sender<'static, Mutex, Block>) {
-    loop {
-        SHARED.tell_acquired(&Acquired::NONE);
-        Timer::after_millis(100).await;
+pub async fn acquire_task(source: Source, mut blocks: Sender<'static, Mutex, Block>) {
+    static BUS: BusState = BusState::new();
+    match source {
+        Source::Camera(host) => {
+            let told = |acquired: &usb::Acquired| SHARED.tell(acquired.into());
+            usb::acquire(host, &BUS, &mut blocks, SATURATION_EV_S, told).await;
+        }
+        Source::Replay(flash) => {
+            let mut sensor = SpiSensor::new(Replay::new(flash), AlwaysReady);
+            let told = |acquired: &spi::Acquired| SHARED.tell(acquired.into());
+            // It never ends.
+            spi::acquire(&mut sensor, Pace::Replay, &mut blocks, told).await.ok();
+        }
     }
 }
 
@@ -67,18 +100,51 @@ pub async fn measure_task(
     measure(tachometer, &mut blocks, Pace::Live, &mut costs, &mut measuring).await;
 }
 
-/// Screen, link and keeping the preferences: one task, so that they share the front.
+/// Screen, touch, button, link and keeping the preferences: one task, so that they share the front.
 #[embassy_executor::task]
-pub async fn front_task(parts: Parts) {
-    let Parts { front, watchdog } = parts;
-    let feed = watchdog::start(watchdog);
+pub async fn front_task(parts: Parts, shows: Shows) {
+    match shows {
+        Shows::Instrument { kept, flash, input } => live(parts, kept, flash, input).await,
+        Shows::Dead(why) => lie_dead(parts, why).await,
+    }
+}
+
+async fn live(
+    parts: Parts,
+    kept: Option<KeptFault>,
+    flash: &'static SharedFlash,
+    input: InputPins,
+) {
+    let mut store = Store::new(flash::Preferences(flash), 0, flash::PREFERENCES_BYTES);
+    let (preferences, damaged) = store.load().await;
+    let damaged = damaged.map(|fault| KeptFault::new(fault, "the stored settings are damaged"));
+    let front = front(parts.panel, preferences, kept.or(damaged));
+    let (mut device, mut port) = port::start(parts.port, uid_hex());
+    let feed = watchdog::start(parts.watchdog);
     let hung = |task: Task| fault::stop(Fault::Watchdog, task.as_str());
-    let showing = tasks::show(front, &SHARED, feed, hung);
-    let answering = async {
+    join5(
+        tasks::show(front, &SHARED, feed, hung),
+        tasks::link(front, &SHARED, &mut port),
+        tasks::save(front, &mut store, preferences),
+        input::watch(front, input),
+        device.run(),
+    )
+    .await;
+}
+
+/// What is left when nothing can be measured: screen and link say why, and nothing takes that away.
+async fn lie_dead(parts: Parts, why: KeptFault) {
+    let front = front(parts.panel, Preferences::default(), None);
+    let (mut device, mut port) = port::start(parts.port, uid_hex());
+    let mut feed = watchdog::start(parts.watchdog);
+    let showing = async {
+        let mut screen = Screen::new();
         loop {
-            SHARED.alive(Task::Link);
-            Timer::after_millis(50).await;
+            front.borrow_mut().fail(why.clone());
+            front.borrow_mut().draw(&mut screen);
+            feed();
+            Timer::after(DEAD_FRAME).await;
         }
     };
-    join(showing, answering).await;
+    join3(showing, tasks::link(front, &SHARED, &mut port), device.run()).await;
 }

@@ -3,11 +3,11 @@
 
 use core::ptr;
 
-use embassy_stm32::Peri;
 use embassy_stm32::fmc::Fmc;
-use embassy_stm32::peripherals as pin;
 use embassy_time::Delay;
 use stm32_fmc::{SdramChip, SdramConfiguration, SdramTiming};
+
+use crate::wiring::SdramPins;
 
 /// Where it begins.
 pub const START: usize = 0xc000_0000;
@@ -63,100 +63,18 @@ pub struct SdramError {
     pub read: u32,
 }
 
-/// The pins that it hangs on.
-pub struct Pins {
-    pub fmc: Peri<'static, pin::FMC>,
-    pub address: (
-        Peri<'static, pin::PF0>,
-        Peri<'static, pin::PF1>,
-        Peri<'static, pin::PF2>,
-        Peri<'static, pin::PF3>,
-        Peri<'static, pin::PF4>,
-        Peri<'static, pin::PF5>,
-        Peri<'static, pin::PF12>,
-        Peri<'static, pin::PF13>,
-        Peri<'static, pin::PF14>,
-        Peri<'static, pin::PF15>,
-        Peri<'static, pin::PG0>,
-        Peri<'static, pin::PG1>,
-    ),
-    pub bank: (Peri<'static, pin::PG4>, Peri<'static, pin::PG5>),
-    pub data: (
-        Peri<'static, pin::PD14>,
-        Peri<'static, pin::PD15>,
-        Peri<'static, pin::PD0>,
-        Peri<'static, pin::PD1>,
-        Peri<'static, pin::PE7>,
-        Peri<'static, pin::PE8>,
-        Peri<'static, pin::PE9>,
-        Peri<'static, pin::PE10>,
-        Peri<'static, pin::PE11>,
-        Peri<'static, pin::PE12>,
-        Peri<'static, pin::PE13>,
-        Peri<'static, pin::PE14>,
-        Peri<'static, pin::PE15>,
-        Peri<'static, pin::PD8>,
-        Peri<'static, pin::PD9>,
-        Peri<'static, pin::PD10>,
-    ),
-    pub mask: (Peri<'static, pin::PE0>, Peri<'static, pin::PE1>),
-    pub clock_enable: Peri<'static, pin::PC3>,
-    pub clock: Peri<'static, pin::PG8>,
-    pub column: Peri<'static, pin::PG15>,
-    pub chip: Peri<'static, pin::PH3>,
-    pub row: Peri<'static, pin::PF11>,
-    pub write: Peri<'static, pin::PH5>,
-}
-
 /// Switches it on and tests it. What was in it is lost.
 ///
 /// # Errors
 ///
 /// When a cell does not hold what was written to it.
 #[inline(never)]
-pub fn start(pins: Pins) -> Result<(), SdramError> {
-    let Pins { fmc, address: a, bank, data: d, mask, .. } = pins;
+pub fn start(p: SdramPins) -> Result<(), SdramError> {
     let mut sdram = Fmc::sdram_a12bits_d16bits_4banks_bank1(
-        fmc,
-        a.0,
-        a.1,
-        a.2,
-        a.3,
-        a.4,
-        a.5,
-        a.6,
-        a.7,
-        a.8,
-        a.9,
-        a.10,
-        a.11,
-        bank.0,
-        bank.1,
-        d.0,
-        d.1,
-        d.2,
-        d.3,
-        d.4,
-        d.5,
-        d.6,
-        d.7,
-        d.8,
-        d.9,
-        d.10,
-        d.11,
-        d.12,
-        d.13,
-        d.14,
-        d.15,
-        mask.0,
-        mask.1,
-        pins.clock_enable,
-        pins.clock,
-        pins.column,
-        pins.chip,
-        pins.row,
-        pins.write,
-        Chip,
+        p.fmc, p.a0, p.a1, p.a2, p.a3, p.a4, p.a5, p.a6, p.a7, p.a8, p.a9, p.a10, p.a11, p.bank0,
+        p.bank1, p.d0, p.d1, p.d2, p.d3, p.d4, p.d5, p.d6, p.d7, p.d8, p.d9, p.d10, p.d11, p.d12,
+        p.d13, p.d14, p.d15, p.mask0, p.mask1, p.clock_enable, p.clock, p.column, p.chip, p.row,
+        p.write, Chip,
     );
     sdram.init(&mut Delay);
     test()

@@ -1,5 +1,8 @@
 //! Whatever is plugged in, for good.
 
+use core::future::pending;
+use core::pin::pin;
+
 use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_sync::zerocopy_channel::Sender;
@@ -77,14 +80,26 @@ async fn connection<'d, H: UsbHostController<'d>>(
     told: &mut impl FnMut(&Acquired),
 ) -> Speed {
     loop {
+        // A reset that has begun is not begun anew.
+        match telling(port.wait_for_device_event(), acquired, told).await {
+            DeviceEvent::Connected(speed) => return speed,
+            DeviceEvent::Overcurrent => acquired.trouble = Some(Trouble::Overcurrent),
+            _ => acquired.trouble = None,
+        }
+    }
+}
+
+/// Waits for something, and tells how it stands meanwhile.
+async fn telling<T>(
+    wanted: impl Future<Output = T>,
+    acquired: &Acquired,
+    told: &mut impl FnMut(&Acquired),
+) -> T {
+    let mut wanted = pin!(wanted);
+    loop {
         told(acquired);
-        match select(port.wait_for_device_event(), Timer::after(SILENCE)).await {
-            Either::First(DeviceEvent::Connected(speed)) => return speed,
-            Either::First(DeviceEvent::Overcurrent) => {
-                acquired.trouble = Some(Trouble::Overcurrent);
-            }
-            Either::First(_) => acquired.trouble = None,
-            Either::Second(()) => {}
+        if let Either::First(came) = select(wanted.as_mut(), Timer::after(SILENCE)).await {
+            return came;
         }
     }
 }
@@ -133,17 +148,20 @@ async fn hold<'d, H: UsbHostController<'d>>(
     acquired: &Acquired,
     told: &mut impl FnMut(&Acquired),
 ) -> Option<Speed> {
-    let mut waited = Duration::from_ticks(0);
-    loop {
-        match select(departure(port), Timer::after(SILENCE)).await {
-            Either::First(End::Anew(speed)) => return Some(speed),
-            Either::First(_) => return None,
-            Either::Second(()) => told(acquired),
+    let patience = async {
+        if trouble.may_pass() {
+            Timer::after(AGAIN).await;
+        } else {
+            pending().await
         }
-        waited += SILENCE;
-        if trouble.may_pass() && waited >= AGAIN {
+    };
+    let gone = select(departure(port), patience);
+    match telling(gone, acquired, told).await {
+        Either::First(End::Anew(speed)) => Some(speed),
+        Either::First(_) => None,
+        Either::Second(()) => {
             port.controller_mut().bus_reset().await;
-            return Some(speed);
+            Some(speed)
         }
     }
 }

@@ -399,7 +399,10 @@ where
                 Some(end) => Err(end),
                 None => Ok(()),
             },
-            Err(_) if failures > PATIENCE && error == PipeError::Disconnected => Err(End::Gone),
+            // The port says that its device is there; a reset may help.
+            Err(_) if failures > PATIENCE && error == PipeError::Disconnected => {
+                Err(Trouble::NoAnswer.into())
+            }
             Err(_) if failures > PATIENCE => Err(Trouble::Damaged.into()),
             // The words before and after may not fit together: what is damaged is counted by the decoder.
             Err(_) => Ok(()),
