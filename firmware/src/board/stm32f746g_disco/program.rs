@@ -58,9 +58,7 @@ fn front(panel: Panel, preferences: Preferences, kept: Option<KeptFault>) -> &'s
     static FRONT: StaticCell<SharedFront> = StaticCell::new();
     static PICTURE: ConstStaticCell<Picture> = ConstStaticCell::new(Picture::EMPTY);
     SHARED.lend(PICTURE.take());
-    FRONT.init_with(|| {
-        RefCell::new(Front::new(&SHARED, preferences, kept, Tape, panel, uid_hex()))
-    })
+    FRONT.init_with(|| RefCell::new(Front::new(&SHARED, preferences, kept, Tape, panel, uid_hex())))
 }
 
 /// Where events come from.
