@@ -12,7 +12,7 @@ use super::ring::Ring;
 const STRIKES: u8 = 3;
 
 /// Where a pipe leads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Endpoint {
     pub address: u8,
     pub number: u8,
@@ -24,7 +24,7 @@ pub struct Endpoint {
 }
 
 /// One transfer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Transfer {
     pub endpoint: Endpoint,
     pub is_in: bool,
@@ -36,7 +36,7 @@ pub struct Transfer {
 }
 
 /// How a transfer ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Ended {
     /// Bytes that went, also before an error.
     pub bytes: u32,
@@ -46,7 +46,7 @@ pub struct Ended {
 }
 
 /// What a channel is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 enum Doing {
     Nothing,
     /// What is left of a transfer, and how many bytes went before.
@@ -55,7 +55,6 @@ enum Doing {
 }
 
 /// A channel.
-#[derive(Debug)]
 pub struct Channel {
     /// Whether a pipe has it.
     pub taken: bool,

@@ -7,7 +7,6 @@ use super::memory::{self, SLOT_BYTES, SLOTS};
 use super::registers::DATA0;
 
 /// The slots, in the order in which they are filled.
-#[derive(Debug)]
 pub struct Ring {
     endpoint: Option<Endpoint>,
     /// Bytes of each; what lies from `first` on for `full` slots waits to be fetched.
