@@ -151,7 +151,7 @@ pub async fn measure_task(
 ) {
     let record = |block: &Block| {
         // A memory that fails ends the recording, and the link says so.
-        Tape::with(|recorder| recorder.push(block.t_us, &block.records).ok());
+        Tape::with(|recorder| recorder.push(block.t_us, block.events()).ok());
     };
     let mut measuring = Measuring::new(&SHARED, record);
     let mut costs = Costs::new(Ticks);

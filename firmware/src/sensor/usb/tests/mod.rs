@@ -77,7 +77,7 @@ fn run(port: &Port, most_ev_s: u32, ms: u64, done: impl Fn(&Acquired, &World) ->
 fn drain(blocks: &mut Receiver<'_, NoopRawMutex, Block>, heard: &mut Heard) {
     while let Some(block) = blocks.try_receive() {
         let mut decoder = Decoder::new(block.t_us);
-        heard.events.extend(block.records.iter().map(|&record| decoder.decode(record)));
+        heard.events.extend(block.events().iter().map(|event| decoder.decode(event.to_bytes())));
         heard.gyro.extend(block.gyro.iter());
         heard.lost += block.lost;
         heard.geometry = Some(block.geometry);
