@@ -1,8 +1,7 @@
 //! A device on the bench: everything the link sees, held in plain fields that a test may set.
 
-use evtach_core::{Event, Geometry, Reading, Reason};
+use evtach_core::{Event, Geometry, PackedEvent, Reading, Reason};
 use evtach_firmware::instrument::{Fault, Preferences, Sensor};
-use evtach_firmware::record;
 use evtach_firmware::recorder::Recorder;
 use evtach_firmware::scpi::{
     Device, Identity, Link, RecorderFailed, RecorderState, RecorderStatus, Statistics, View,
@@ -85,9 +84,9 @@ impl Bench {
 
     /// Events from the sensor, to the recorder.
     pub fn record(&mut self, events: &[Event]) {
-        let records: Vec<record::Record> = events.iter().map(record::encode).collect();
+        let packed: Vec<PackedEvent> = events.iter().map(PackedEvent::pack).collect();
         if let (Some(recorder), Some(first)) = (&mut self.recorder, events.first()) {
-            recorder.push(first.t_us, &records).ok();
+            recorder.push(first.t_us, &packed).ok();
         }
     }
 }

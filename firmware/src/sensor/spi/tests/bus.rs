@@ -124,9 +124,9 @@ async fn all(blocks: &mut Receiver<'_, NoopRawMutex, Block>) -> (Vec<Event>, u64
     loop {
         let block = blocks.receive().await;
         let mut decoder = Decoder::new(block.t_us);
-        events.extend(block.records.iter().map(|&record| decoder.decode(record)));
+        events.extend(block.events().iter().map(|event| decoder.decode(event.to_bytes())));
         lost += block.lost;
-        assert!(block.records.is_empty() || block.geometry == GEOMETRY);
+        assert!(block.events().is_empty() || block.geometry == GEOMETRY);
         let last = block.last;
         blocks.receive_done();
         if last {
@@ -221,7 +221,7 @@ fn nobody_measures_and_acquiring_goes_on_thinned_and_counted() {
         }
         let (mut received, mut lost) = (0, 0);
         while let Some(block) = receiver.try_receive() {
-            received += block.records.len() as u64;
+            received += block.events().len() as u64;
             lost += block.lost;
             receiver.receive_done();
         }
