@@ -47,6 +47,7 @@ step_lint() {
   cargo clippy --workspace --all-targets -- -D warnings
   # What only the device compiles; and with defmt, which no program here links yet.
   cargo clippy -p evtach-core -p evtach-firmware --target "$target" -- -D warnings
+  cargo clippy -p evtach-firmware --features stm32f746g-disco --target "$target" -- -D warnings
   cargo clippy -p evtach-core -p evtach-firmware --lib --features evtach-core/defmt,evtach-firmware/defmt \
     --target "$target" -- -D warnings
 }
@@ -62,6 +63,7 @@ step_docs() {
 # The limits on the core's state and store are assertions in the firmware: past them it does not build.
 step_image() {
   cargo build --release -p evtach-core --target "$target"
+  cargo fw-qemu
   cargo fw
 }
 

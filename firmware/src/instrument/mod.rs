@@ -41,6 +41,10 @@ pub enum Fault {
     Watchdog,
     /// The stored preferences could not be read; the defaults stand.
     Preferences,
+    /// The crystal of the device's clock does not swing: nothing is measured.
+    Crystal,
+    /// The external memory does not hold what is written to it: nothing is measured.
+    Memory,
 }
 
 /// What is known of the sensor, apart from its events.

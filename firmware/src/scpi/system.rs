@@ -91,6 +91,8 @@ impl Session {
                         Fault::Exception => "exception",
                         Fault::Watchdog => "watchdog",
                         Fault::Preferences => "preferences",
+                        Fault::Crystal => "crystal",
+                        Fault::Memory => "memory",
                     });
                     out.text(words);
                 }

@@ -12,7 +12,7 @@ impl<R: Recording, P: Panel> Device for Front<R, P> {
     }
 
     fn sensor(&self) -> Sensor {
-        if self.shared.acquired().sensor.is_some() { Sensor::Present } else { Sensor::Absent }
+        if self.shared.standing().geometry.is_some() { Sensor::Present } else { Sensor::Absent }
     }
 
     fn reading(&self) -> Option<&Reading> {
@@ -81,7 +81,7 @@ impl<R: Recording, P: Panel> Device for Front<R, P> {
     }
 
     fn geometry(&self) -> Option<Geometry> {
-        self.shared.acquired().sensor.map(|hello| hello.geometry)
+        self.shared.standing().geometry
     }
 
     fn view(&self) -> View {

@@ -35,7 +35,7 @@ pub fn build() -> Result<Image, DeviceError> {
     let root = root();
     let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let output = Command::new(&cargo)
-        .args(["fw", "--quiet", "--message-format=json-render-diagnostics"])
+        .args(["fw-qemu", "--quiet", "--message-format=json-render-diagnostics"])
         .current_dir(&root)
         .stderr(std::process::Stdio::inherit())
         .output()

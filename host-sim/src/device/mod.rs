@@ -28,10 +28,10 @@ pub enum DeviceError {
         source: std::io::Error,
     },
     /// The firmware does not build.
-    #[error("the firmware does not build: run `cargo fw` in {} to see why", .0.display())]
+    #[error("the firmware does not build: run `cargo fw-qemu` in {} to see why", .0.display())]
     Build(PathBuf),
     /// The image is not what the linker should have written.
-    #[error("{}: {source}; run `cargo fw` to build it anew", .path.display())]
+    #[error("{}: {source}; run `cargo fw-qemu` to build it anew", .path.display())]
     Image {
         /// The image.
         path: PathBuf,

@@ -19,7 +19,7 @@ mod registers;
 mod ring;
 
 pub use host::Host;
-pub use phy::{Pins, start};
+pub use phy::start;
 
 use critical_section::Mutex;
 use embassy_sync::waitqueue::AtomicWaker;

@@ -1,14 +1,15 @@
 //! The PHY outside of the chip (USB3320C), its twelve wires, and the core's start.
 
 use embassy_stm32::gpio::{AfType, Flex, OutputType, Speed};
-use embassy_stm32::pac::RCC;
-use embassy_stm32::{Peri, interrupt, peripherals as pin};
+use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt as _, Priority};
+use embassy_stm32::pac::RCC;
 use embassy_time::Timer;
 use embassy_usb_synopsys_otg::otg_v1::regs;
 
 use super::host::Host;
 use super::registers::{OTG, port};
+use crate::wiring::HostPins;
 
 /// Words of the core's FIFO memory that receive, send, and send periodically. The last of its 1024 hold what its DMA
 /// remembers of the channels.
@@ -28,42 +29,21 @@ const LOOKS: u32 = 100_000;
 /// Time in which the core becomes a host (RM0385, OTG_GUSBCFG.FHMOD).
 const HOST_MODE_MS: u64 = 25;
 
-/// The core and its wires to the PHY.
-pub struct Pins {
-    pub otg: Peri<'static, pin::USB_OTG_HS>,
-    pub clock: Peri<'static, pin::PA5>,
-    pub data: (
-        Peri<'static, pin::PA3>,
-        Peri<'static, pin::PB0>,
-        Peri<'static, pin::PB1>,
-        Peri<'static, pin::PB10>,
-        Peri<'static, pin::PB11>,
-        Peri<'static, pin::PB12>,
-        Peri<'static, pin::PB13>,
-        Peri<'static, pin::PB5>,
-    ),
-    pub stop: Peri<'static, pin::PC0>,
-    pub direction: Peri<'static, pin::PC2>,
-    pub next: Peri<'static, pin::PH4>,
-}
-
 /// Gives the core its wires and its clock. It is started when somebody waits for a device.
-pub fn start(pins: Pins, priority: Priority) -> Host {
-    let Pins { otg: _, clock, data, stop, direction, next } = pins;
-    let (d0, d1, d2, d3, d4, d5, d6, d7) = data;
+pub fn start(p: HostPins, priority: Priority) -> Host {
     let wires = [
-        Flex::new(clock),
-        Flex::new(d0),
-        Flex::new(d1),
-        Flex::new(d2),
-        Flex::new(d3),
-        Flex::new(d4),
-        Flex::new(d5),
-        Flex::new(d6),
-        Flex::new(d7),
-        Flex::new(stop),
-        Flex::new(direction),
-        Flex::new(next),
+        Flex::new(p.clock),
+        Flex::new(p.d0),
+        Flex::new(p.d1),
+        Flex::new(p.d2),
+        Flex::new(p.d3),
+        Flex::new(p.d4),
+        Flex::new(p.d5),
+        Flex::new(p.d6),
+        Flex::new(p.d7),
+        Flex::new(p.stop),
+        Flex::new(p.direction),
+        Flex::new(p.next),
     ];
     for mut wire in wires {
         wire.set_as_af_unchecked(10, AfType::output(OutputType::PushPull, Speed::VeryHigh));
