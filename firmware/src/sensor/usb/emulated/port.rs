@@ -44,8 +44,6 @@ pub enum Act {
     Vanish,
     /// Nothing answers any more, and nothing fails: requests wait for ever.
     Hang,
-    /// Something is done to the camera.
-    Camera(fn(&mut Camera)),
     /// The next requests for data fail like this.
     Fail(PipeError, u32),
 }
@@ -63,7 +61,8 @@ enum Presence {
 /// What happens in front of the port, and what has been asked of it.
 #[derive(Debug)]
 pub struct World {
-    began: Instant,
+    /// When somebody looked first.
+    began: Option<Instant>,
     acts: VecDeque<(Duration, Act)>,
     device: Option<Device>,
     presence: Presence,
@@ -86,12 +85,12 @@ pub struct Port(pub Rc<RefCell<World>>);
 const TICK: Duration = Duration::from_micros(200);
 
 impl World {
-    /// A port to which this happens, each at so many milliseconds from now.
+    /// A port to which this happens, each at so many milliseconds from the first look at it.
     #[must_use]
     pub fn begin(acts: Vec<(u64, Act)>) -> Port {
         let acts = acts.into_iter().map(|(ms, act)| (Duration::from_millis(ms), act)).collect();
         Port(Rc::new(RefCell::new(Self {
-            began: Instant::now(),
+            began: None,
             acts,
             device: None,
             presence: Presence::None,
@@ -122,7 +121,7 @@ impl World {
 
     /// Does what is due, and lets the camera's time pass.
     fn tick(&mut self) {
-        let age = self.began.elapsed();
+        let age = self.began.get_or_insert_with(Instant::now).elapsed();
         while let Some((_, act)) = self.acts.pop_front_if(|(at, _)| *at <= age) {
             self.act(act);
         }
@@ -152,11 +151,6 @@ impl World {
             }
             Act::Vanish => self.presence = Presence::Vanished,
             Act::Hang => self.presence = Presence::Hung,
-            Act::Camera(change) => {
-                if let Some(camera) = self.camera_mut() {
-                    change(camera);
-                }
-            }
             Act::Fail(error, times) => self.failing = (Some(error), times),
         }
     }

@@ -6,7 +6,6 @@ use std::string::{String, ToString};
 use std::vec;
 use std::vec::Vec;
 
-use embassy_futures::block_on;
 use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::zerocopy_channel::{Channel, Receiver};
@@ -20,6 +19,7 @@ use super::emulated::{Act, Camera, Device, Fault, Port, World};
 use super::*;
 use crate::intake::{BLOCKS, Block};
 use crate::record::Decoder;
+use crate::test_time::block_on;
 
 mod faults;
 mod rates;
@@ -29,7 +29,7 @@ mod streams;
 mod torn;
 
 /// What came out of a port.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Heard {
     events: Vec<Event>,
     gyro: Vec<GyroSample>,
@@ -38,6 +38,20 @@ struct Heard {
     /// Every camera and every trouble, in the order in which they were told.
     stands: Vec<(Option<Model>, Option<Trouble>)>,
     acquired: Acquired,
+    /// Until it was over.
+    took: Duration,
+}
+
+impl Heard {
+    const NOTHING: Self = Self {
+        events: Vec::new(),
+        gyro: Vec::new(),
+        lost: 0,
+        geometry: None,
+        stands: Vec::new(),
+        acquired: Acquired::NONE,
+        took: Duration::from_ticks(0),
+    };
 }
 
 /// Lets a port run for so long, or until `done` says so, with somebody who takes every block.
@@ -46,7 +60,7 @@ fn run(port: &Port, most_ev_s: u32, ms: u64, done: impl Fn(&Acquired, &World) ->
     let mut buffers = [const { Block::EMPTY }; BLOCKS];
     let mut channel = Channel::<NoopRawMutex, _>::new(&mut buffers);
     let (mut sender, mut receiver) = channel.split();
-    let mut heard = Heard::default();
+    let mut heard = Heard::NOTHING;
     let mut stands = Vec::new();
     let mut acquired = Acquired::NONE;
     let over = core::cell::Cell::new(false);
@@ -61,17 +75,19 @@ fn run(port: &Port, most_ev_s: u32, ms: u64, done: impl Fn(&Acquired, &World) ->
         over.set(done(now, &port.0.borrow()));
     };
     let acquiring = acquire(port.clone(), state, &mut sender, most_ev_s, told);
-    let until = Instant::now() + Duration::from_millis(ms);
-    let waiting = async {
-        while Instant::now() < until && !over.get() {
-            Timer::after_millis(1).await;
+    let took = block_on(async {
+        let begun = Instant::now();
+        let waiting = async {
+            while begun.elapsed() < Duration::from_millis(ms) && !over.get() {
+                Timer::after_micros(500).await;
+            }
+        };
+        match select(acquiring, waiting).await {
+            Either::First(never) => never,
+            Either::Second(()) => begun.elapsed(),
         }
-    };
-    match block_on(select(acquiring, waiting)) {
-        Either::First(never) => never,
-        Either::Second(()) => {}
-    }
-    Heard { acquired, stands, ..heard }
+    });
+    Heard { acquired, stands, took, ..heard }
 }
 
 fn drain(blocks: &mut Receiver<'_, NoopRawMutex, Block>, heard: &mut Heard) {

@@ -36,9 +36,9 @@ fn what_the_fifo_cannot_hold_is_counted_by_the_camera_and_told() {
 
 #[test]
 fn more_than_the_instrument_can_use_is_left_out_by_the_camera_and_counted() {
-    let seen = events(Model::Davis346, 300_000, 300_000);
+    let seen = events(Model::Davis346, 400_000, 400_000);
     let port = World::begin(vec![(0, plug(Camera::new(Model::Davis346, seen)))]);
-    let heard = run(&port, 200_000, 6_000, settled);
+    let heard = run(&port, 240_000, 9_000, settled);
     let world = port.0.borrow();
     let camera = world.camera().expect("a camera");
     assert!(
@@ -111,7 +111,7 @@ fn nobody_measures_and_acquiring_goes_on_thinned_and_counted() {
         Either::First(never) => never,
         Either::Second(()) => {}
     }
-    let mut heard = Heard { acquired, ..Heard::default() };
+    let mut heard = Heard { acquired, ..Heard::NOTHING };
     drain(&mut receiver, &mut heard);
     assert!(acquired.delivered.thinned > 0 && acquired.delivered.overrun > 0, "{acquired}");
     assert_eq!(acquired.delivered.received, 60_000);
