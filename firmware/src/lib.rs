@@ -20,4 +20,6 @@ pub mod scpi;
 pub mod sensor;
 pub mod settings;
 pub mod tasks;
+#[cfg(test)]
+mod test_time;
 pub mod ui;

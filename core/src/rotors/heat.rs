@@ -12,6 +12,25 @@ pub struct HeatMap<'m> {
     grid: CellGrid,
 }
 
+/// Counts events of pixels on the sensor.
+#[derive(Debug)]
+pub struct Counter<'h> {
+    counts: &'h mut [u16],
+    columns: u32,
+    cell_log2: u32,
+}
+
+impl Counter<'_> {
+    /// Counts one event; a cell saturates at 65 535. A pixel off the sensor may count for another.
+    #[inline(always)]
+    pub fn add(&mut self, x: u32, y: u32) {
+        let cell = (y >> self.cell_log2) * self.columns + (x >> self.cell_log2);
+        if let Some(count) = self.counts.get_mut(cell as usize) {
+            *count = count.saturating_add(1);
+        }
+    }
+}
+
 /// How pixels map to cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CellGrid {
@@ -156,11 +175,11 @@ impl<'m> HeatMap<'m> {
         &self.counts[..self.grid.len().min(self.counts.len())]
     }
 
-    /// Counts one event; a cell saturates at 65 535.
-    pub fn add(&mut self, x: u16, y: u16) {
-        if let Some(count) = self.counts.get_mut(self.grid.index(x, y)) {
-            *count = count.saturating_add(1);
-        }
+    /// What counts events, with all that is the same for each of them looked up once.
+    #[inline]
+    pub fn counter(&mut self) -> Counter<'_> {
+        let CellGrid { columns, cell_log2, .. } = self.grid;
+        Counter { counts: self.counts, columns: columns as u32, cell_log2: cell_log2.into() }
     }
 
     /// Lets the map fade by one part in `window_segments`: called as each segment of a sliding window closes.

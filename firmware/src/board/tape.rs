@@ -84,7 +84,7 @@ impl Tape {
     /// Records a block, while something is recorded.
     pub fn push(block: &Block) {
         // A memory that fails ends the recording, and the link says so.
-        Self::with(|recorder| recorder.push(block.t_us, &block.records).ok());
+        Self::with(|recorder| recorder.push(block.t_us, block.events()).ok());
     }
 
     fn with<T>(work: impl FnOnce(&mut Recorder<RecordingMemory>) -> T) -> Option<T> {

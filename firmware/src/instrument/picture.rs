@@ -98,13 +98,13 @@ mod tests {
         let mut heat = HeatMap::new(&mut counts, Geometry { width_px: 40, height_px: 80 });
         for (x, events) in [(0, 10), (4, 100), (8, 200), (12, 60_000)] {
             for _ in 0..events {
-                heat.add(x, 8);
+                heat.counter().add(x, 8);
             }
         }
         // A rotor, beside which the hot pixel is one cell in a hundred.
-        for cell in 0..100_u16 {
+        for cell in 0..100 {
             for _ in 0..200 {
-                heat.add(cell % 10 * 4, 40 + cell / 10 * 4);
+                heat.counter().add(cell % 10 * 4, 40 + cell / 10 * 4);
             }
         }
         let mut picture = Picture::EMPTY;

@@ -4,10 +4,9 @@ use core::mem;
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_sync::zerocopy_channel::Sender;
-use evtach_core::{Event, Geometry, GyroSample};
+use evtach_core::{Event, Geometry, GyroSample, PackedEvent};
 
-use crate::intake::{BLOCK_EVENTS, BLOCKS, Block};
-use crate::record;
+use crate::intake::{BLOCKS, Block};
 
 /// With more blocks than these waiting to be measured, events are thinned further; with fewer than
 /// the second, less.
@@ -90,31 +89,30 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
                 self.lost += u64::from(events - before);
                 break;
             };
-            slot.records.clear();
-            slot.gyro.clear();
-            let mask = (1 << self.stride_log2) - 1;
+            slot.clear();
             while !words.is_done() && !slot.gyro.is_full() {
-                let room = BLOCK_EVENTS - slot.records.len();
-                if room < words.most_events_a_word() {
+                if slot.space().len() < words.most_events_a_word() {
                     break;
                 }
-                let sample = words.decode(room / words.most_events_a_word(), |event| {
-                    events += 1;
-                    self.phase = self.phase.wrapping_add(1);
-                    if self.phase & mask != 0 {
-                        self.delivered.thinned += 1;
-                        return;
-                    }
-                    if slot.records.is_empty() {
-                        slot.t_us = event.t_us;
-                    }
-                    slot.records.push(record::encode(&event)).ok();
-                });
-                if let Some(sample) = sample {
-                    slot.gyro.push(sample).ok();
+                let Some((count, first_us)) = fill(&mut words, slot) else { continue };
+                events += count as u32;
+                let before = slot.events().len() - count;
+                if self.stride_log2 > 0 {
+                    let mask = (1 << self.stride_log2) - 1;
+                    let phase = &mut self.phase;
+                    let went = slot.retain(before, || {
+                        *phase = phase.wrapping_add(1);
+                        *phase & mask == 0
+                    });
+                    self.delivered.thinned += went as u64;
+                }
+                if before == 0
+                    && let Some(first) = slot.events().first()
+                {
+                    slot.t_us = first.unpack(first_us).t_us;
                 }
             }
-            if !slot.records.is_empty() || !slot.gyro.is_empty() {
+            if !slot.is_empty() {
                 slot.geometry = geometry;
                 slot.lost = mem::take(&mut self.lost);
                 slot.last = false;
@@ -137,10 +135,32 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
     /// Marks the end of a recording.
     pub async fn close(&mut self) {
         let slot = self.blocks.send().await;
-        slot.records.clear();
-        slot.gyro.clear();
+        slot.clear();
         slot.lost = mem::take(&mut self.lost);
         slot.last = true;
         self.blocks.send_done();
     }
+}
+
+/// Fills the space of a block, as far as words cannot overfill it; returns how many events came, and the time of
+/// the first in microseconds; `None` when none did.
+fn fill(words: &mut impl Words, block: &mut Block) -> Option<(usize, u64)> {
+    let most = words.most_events_a_word();
+    let space = block.space();
+    let (room, mut first_us) = (space.len(), None);
+    let mut places = space.iter_mut();
+    let sample = words.decode(room / most, |event| {
+        if first_us.is_none() {
+            first_us = Some(event.t_us);
+        }
+        if let Some(place) = places.next() {
+            *place = PackedEvent::pack(&event);
+        }
+    });
+    let count = room - places.len();
+    block.filled(count);
+    if let Some(sample) = sample {
+        block.gyro.push(sample).ok();
+    }
+    first_us.map(|first_us| (count, first_us))
 }

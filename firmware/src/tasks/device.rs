@@ -5,6 +5,7 @@ use evtach_core::{Geometry, Reading, Reason};
 use super::front::{Front, Panel, Recording};
 use crate::instrument::{Action, Fault, Mode, Preferences, Sensor, State};
 use crate::scpi::{Device, Identity, RecorderFailed, RecorderStatus, Statistics, View};
+use crate::sensor::usb::Trouble;
 
 impl<R: Recording, P: Panel> Device for Front<R, P> {
     fn identity(&self) -> Identity<'_> {
@@ -13,6 +14,10 @@ impl<R: Recording, P: Panel> Device for Front<R, P> {
 
     fn sensor(&self) -> Sensor {
         if self.shared.standing().geometry.is_some() { Sensor::Present } else { Sensor::Absent }
+    }
+
+    fn trouble(&self) -> Option<Trouble> {
+        self.instrument.trouble()
     }
 
     fn reading(&self) -> Option<&Reading> {

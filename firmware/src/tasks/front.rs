@@ -113,6 +113,7 @@ impl<R: Recording, P: Panel> Front<R, P> {
         let standing = self.shared.standing();
         let sensor = if standing.geometry.is_some() { Sensor::Present } else { Sensor::Absent };
         self.instrument.set_sensor(sensor);
+        self.instrument.set_trouble(standing.trouble);
         let now = Instant::now();
         if standing.latest_us != self.reached.0 {
             self.reached = (standing.latest_us, now);

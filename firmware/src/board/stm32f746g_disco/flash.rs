@@ -298,7 +298,10 @@ impl embedded_hal_async::spi::Error for FlashError {
 }
 
 impl SpiDevice for Replay {
-    async fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), FlashError> {
+    async fn transaction(
+        &mut self,
+        operations: &mut [Operation<'_, u8>],
+    ) -> Result<(), FlashError> {
         for operation in operations {
             let Operation::Read(bytes) = operation else { return Err(FlashError::ReadOnly) };
             if self.next.saturating_add(bytes.len() as u32) > BYTES {

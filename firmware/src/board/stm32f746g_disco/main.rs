@@ -3,6 +3,8 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
+mod apart;
+#[cfg(target_os = "none")]
 mod cache;
 #[cfg(target_os = "none")]
 mod clock;

@@ -42,16 +42,21 @@ pub fn start(pins: PortPins, serial: &'static str) -> (UsbDevice<'static, Driver
     let mut config = usb::Config::default();
     // The wire that would tell of the PC's power leads to a pin that the core does not look at.
     config.vbus_detection = false;
-    let driver =
-        usb::Driver::new_fs(pins.usb, Irqs, pins.plus, pins.minus, PACKETS.take(), config);
+    let driver = usb::Driver::new_fs(pins.usb, Irqs, pins.plus, pins.minus, PACKETS.take(), config);
     let mut config = Config::new(VENDOR, PRODUCT);
     config.manufacturer = Some("EV-Tach");
     config.product = Some("EV-Tach tachometer");
     config.serial_number = Some(serial);
     config.self_powered = true;
     config.max_power = 100;
-    let mut builder =
-        Builder::new(driver, config, CONFIGURATION.take(), CAPABILITIES.take(), &mut [], CONTROL.take());
+    let mut builder = Builder::new(
+        driver,
+        config,
+        CONFIGURATION.take(),
+        CAPABILITIES.take(),
+        &mut [],
+        CONTROL.take(),
+    );
     let class = CdcAcmClass::new(&mut builder, STATE.init(State::new()), PACKET_BYTES as u16);
     let (sender, receiver) = class.split();
     let port = Port { sender, receiver, packet: [0; PACKET_BYTES], rest: 0..0 };

@@ -1,8 +1,9 @@
 //! The instrument: acquire, measure, show, answer, for good.
 
 use core::cell::RefCell;
+use core::pin::pin;
 
-use embassy_futures::join::{join3, join5};
+use embassy_futures::join::join3;
 use embassy_stm32::uid::uid_hex;
 use embassy_sync::zerocopy_channel::{Receiver, Sender};
 use embassy_time::{Duration, Timer};
@@ -20,6 +21,7 @@ use evtach_firmware::tasks::{self, Front, Measuring, Shared, Task};
 use evtach_firmware::ui::Screen;
 use static_cell::{ConstStaticCell, StaticCell};
 
+use crate::apart::Apart;
 use crate::flash::{self, Replay, SharedFlash};
 use crate::memory::Mutex;
 use crate::otg_hs::Host;
@@ -58,9 +60,7 @@ fn front(panel: Panel, preferences: Preferences, kept: Option<KeptFault>) -> &'s
     static FRONT: StaticCell<SharedFront> = StaticCell::new();
     static PICTURE: ConstStaticCell<Picture> = ConstStaticCell::new(Picture::EMPTY);
     SHARED.lend(PICTURE.take());
-    FRONT.init_with(|| {
-        RefCell::new(Front::new(&SHARED, preferences, kept, Tape, panel, uid_hex()))
-    })
+    FRONT.init_with(|| RefCell::new(Front::new(&SHARED, preferences, kept, Tape, panel, uid_hex())))
 }
 
 /// Where events come from.
@@ -78,15 +78,19 @@ pub async fn acquire_task(source: Source, mut blocks: Sender<'static, Mutex, Blo
     match source {
         Source::Camera(host) => {
             let told = |acquired: &usb::Acquired| SHARED.tell(acquired.into());
-            usb::acquire(host, &BUS, &mut blocks, SATURATION_EV_S, told).await;
+            Apart(pin!(usb::acquire(host, &BUS, &mut blocks, SATURATION_EV_S, told))).await;
         }
         Source::Replay(flash) => {
-            let mut sensor = SpiSensor::new(Replay::new(flash), AlwaysReady);
-            let told = |acquired: &spi::Acquired| SHARED.tell(acquired.into());
-            // It never ends.
-            spi::acquire(&mut sensor, Pace::Replay, &mut blocks, told).await.ok();
+            Apart(pin!(replay(flash, &mut blocks))).await;
         }
     }
+}
+
+async fn replay(flash: &'static SharedFlash, blocks: &mut Sender<'static, Mutex, Block>) {
+    let mut sensor = SpiSensor::new(Replay::new(flash), AlwaysReady);
+    let told = |acquired: &spi::Acquired| SHARED.tell(acquired.into());
+    // It never ends.
+    spi::acquire(&mut sensor, Pace::Replay, blocks, told).await.ok();
 }
 
 #[embassy_executor::task]
@@ -104,8 +108,10 @@ pub async fn measure_task(
 #[embassy_executor::task]
 pub async fn front_task(parts: Parts, shows: Shows) {
     match shows {
-        Shows::Instrument { kept, flash, input } => live(parts, kept, flash, input).await,
-        Shows::Dead(why) => lie_dead(parts, why).await,
+        Shows::Instrument { kept, flash, input } => {
+            Apart(pin!(live(parts, kept, flash, input))).await;
+        }
+        Shows::Dead(why) => Apart(pin!(lie_dead(parts, why))).await,
     }
 }
 
@@ -116,20 +122,19 @@ async fn live(
     input: InputPins,
 ) {
     let mut store = Store::new(flash::Preferences(flash), 0, flash::PREFERENCES_BYTES);
-    let (preferences, damaged) = store.load().await;
+    let (preferences, damaged) = Apart(pin!(store.load())).await;
     let damaged = damaged.map(|fault| KeptFault::new(fault, "the stored settings are damaged"));
     let front = front(parts.panel, preferences, kept.or(damaged));
     let (mut device, mut port) = port::start(parts.port, uid_hex());
     let feed = watchdog::start(parts.watchdog);
     let hung = |task: Task| fault::stop(Fault::Watchdog, task.as_str());
-    join5(
-        tasks::show(front, &SHARED, feed, hung),
-        tasks::link(front, &SHARED, &mut port),
-        tasks::save(front, &mut store, preferences),
-        input::watch(front, input),
-        device.run(),
-    )
-    .await;
+    let showing = pin!(tasks::show(front, &SHARED, feed, hung));
+    let answering = pin!(tasks::link(front, &SHARED, &mut port));
+    let saving = pin!(tasks::save(front, &mut store, preferences));
+    let watching = pin!(input::watch(front, input));
+    let running = pin!(device.run());
+    let seen = join3(Apart(showing), Apart(watching), Apart(saving));
+    join3(seen, Apart(answering), Apart(running)).await;
 }
 
 /// What is left when nothing can be measured: screen and link say why, and nothing takes that away.
@@ -146,5 +151,7 @@ async fn lie_dead(parts: Parts, why: KeptFault) {
             Timer::after(DEAD_FRAME).await;
         }
     };
-    join3(showing, tasks::link(front, &SHARED, &mut port), device.run()).await;
+    let answering = pin!(tasks::link(front, &SHARED, &mut port));
+    let running = pin!(device.run());
+    join3(showing, Apart(answering), Apart(running)).await;
 }

@@ -1,10 +1,11 @@
 //! The events in a frame.
 
-use evtach_core::Event;
 use evtach_core::decode::{Evt2, Evt3};
+use evtach_core::{Event, GyroSample};
 
 use super::frame::Kind;
 use super::parser::Frame;
+use crate::sensor::outlet;
 
 /// Most events that one word of EVT 3 stands for: a vector.
 const VECTOR_EVENTS: usize = 12;
@@ -62,8 +63,9 @@ impl<'f> Words<'f> {
     #[inline]
     pub fn decode(&mut self, words: usize, mut emit: impl FnMut(Event)) {
         let base_us = self.base_us;
+        // Times that no sensor reaches may wrap.
         let mut place =
-            |event: Event| emit(Event { t_us: base_us.saturating_add(event.t_us), ..event });
+            |event: Event| emit(Event { t_us: base_us.wrapping_add(event.t_us), ..event });
         match &mut self.decoder {
             Decoder::Evt2(decoder) => {
                 for word in take(&mut self.rest, words) {
@@ -77,6 +79,23 @@ impl<'f> Words<'f> {
             }
             Decoder::None => self.rest = &[],
         }
+    }
+}
+
+/// A bridge sends no gyro samples.
+impl outlet::Words for Words<'_> {
+    fn most_events_a_word(&self) -> usize {
+        self.most_events_a_word()
+    }
+
+    fn is_done(&self) -> bool {
+        self.is_done()
+    }
+
+    #[inline]
+    fn decode(&mut self, words: usize, emit: impl FnMut(Event)) -> Option<GyroSample> {
+        self.decode(words, emit);
+        None
     }
 }
 

@@ -59,16 +59,16 @@ pub async fn acquire<'d, H: UsbHostController<'d>, M: RawMutex>(
         // There is one port, so that whoever had an address has gone.
         (1..=ADDRESSES).for_each(|address| handle.free_address(address));
         plugged = match end {
-            End::Gone => {
-                acquired.trouble = None;
-                None
-            }
+            End::Gone => None,
             End::Anew(speed) => Some(speed),
             End::Trouble(trouble) => {
                 acquired.trouble = Some(trouble);
                 hold(&mut port, speed, trouble, &acquired, &mut told).await
             }
         };
+        if plugged.is_none() {
+            acquired.trouble = None;
+        }
         told(&acquired);
     }
 }

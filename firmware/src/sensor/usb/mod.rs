@@ -23,4 +23,7 @@ pub use acquire::acquire;
 pub use limit::Limit;
 pub use model::Model;
 pub use registers::{Module, Register, Transfer};
-pub use trouble::Trouble;
+pub use trouble::{TROUBLE_BYTES, Trouble};
+
+#[cfg(test)]
+mod tests;

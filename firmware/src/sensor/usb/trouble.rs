@@ -7,6 +7,9 @@ use embassy_usb_driver::host::PipeError;
 use super::model::Model;
 use super::registers::Register;
 
+/// Most bytes of a trouble in words.
+pub const TROUBLE_BYTES: usize = 72;
+
 /// Why there is no camera at the port, in words for the screen: what is, and what to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

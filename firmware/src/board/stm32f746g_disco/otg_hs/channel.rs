@@ -50,7 +50,11 @@ pub struct Ended {
 enum Doing {
     Nothing,
     /// What is left of a transfer, and how many bytes went before.
-    Transfer { rest: Transfer, before: u32, strikes: u8 },
+    Transfer {
+        rest: Transfer,
+        before: u32,
+        strikes: u8,
+    },
     Ended(Ended),
 }
 
@@ -104,8 +108,7 @@ impl Transfer {
     /// What is left behind so many packets.
     fn behind(self, packets: u32, pid: u8) -> (Self, u32) {
         let bytes = (packets * u32::from(self.endpoint.packet_bytes)).min(self.bytes);
-        let rest =
-            Self { address: self.address + bytes, bytes: self.bytes - bytes, pid, ..self };
+        let rest = Self { address: self.address + bytes, bytes: self.bytes - bytes, pid, ..self };
         (rest, bytes)
     }
 }
@@ -196,11 +199,8 @@ impl Channel {
     fn resume(&mut self, index: usize, size: regs::Hctsiz, strikes: u8, ping: bool) {
         let Doing::Transfer { rest, before, .. } = self.doing else { return };
         let packets = went(&rest, size);
-        let (rest, last) = if rest.pid == SETUP {
-            (rest, 0)
-        } else {
-            rest.behind(packets, size.dpid())
-        };
+        let (rest, last) =
+            if rest.pid == SETUP { (rest, 0) } else { rest.behind(packets, size.dpid()) };
         let strikes = if packets > 0 { strikes.min(1) } else { strikes };
         self.doing = Doing::Transfer { rest, before: before + last, strikes };
         rest.begin(index, ping);

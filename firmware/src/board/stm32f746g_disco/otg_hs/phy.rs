@@ -1,9 +1,9 @@
 //! The PHY outside of the chip (USB3320C), its twelve wires, and the core's start.
 
 use embassy_stm32::gpio::{AfType, Flex, OutputType, Speed};
-use embassy_stm32::pac::RCC;
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt as _, Priority};
+use embassy_stm32::pac::RCC;
 use embassy_time::Timer;
 use embassy_usb_synopsys_otg::otg_v1::regs;
 

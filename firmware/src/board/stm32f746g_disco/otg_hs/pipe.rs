@@ -8,7 +8,7 @@ use core::task::Poll;
 use embassy_time::{Duration, with_timeout};
 use embassy_usb_driver::host::{PipeError, TimeoutConfig, UsbPipe, pipe};
 
-use super::channel::{self, Channel, Endpoint, Ended, Transfer};
+use super::channel::{self, Channel, Ended, Endpoint, Transfer};
 use super::memory::{self, BUFFER_BYTES};
 use super::registers::{DATA0, DATA1, SETUP};
 use super::ring::{Ring, Waiting};
@@ -27,13 +27,7 @@ pub struct Pipe<T, D> {
 impl<T: pipe::Type, D: pipe::Direction> Pipe<T, D> {
     /// A pipe on a channel that has been taken for it.
     pub fn new(index: usize, endpoint: Endpoint) -> Self {
-        Self {
-            index,
-            endpoint,
-            pid: DATA0,
-            timeout: TimeoutConfig::default(),
-            kind: PhantomData,
-        }
+        Self { index, endpoint, pid: DATA0, timeout: TimeoutConfig::default(), kind: PhantomData }
     }
 }
 
@@ -54,8 +48,7 @@ impl<T, D> Pipe<T, D> {
         })?;
         let ended = poll_fn(|context| {
             CHANNEL_WAKERS[self.index].register(context.waker());
-            with(|state| state.channels[self.index].take_end())
-                .map_or(Poll::Pending, Poll::Ready)
+            with(|state| state.channels[self.index].take_end()).map_or(Poll::Pending, Poll::Ready)
         })
         .await;
         drop(underway);
@@ -106,7 +99,9 @@ impl<T, D> Pipe<T, D> {
 
     async fn setup(&mut self, setup: &[u8; 8]) -> Result<(), PipeError> {
         // SAFETY: as in `send`.
-        unsafe { ptr::copy_nonoverlapping(setup.as_ptr(), memory::buffer(self.index), setup.len()) };
+        unsafe {
+            ptr::copy_nonoverlapping(setup.as_ptr(), memory::buffer(self.index), setup.len())
+        };
         self.transfer(false, SETUP, setup.len()).await?;
         Ok(())
     }
@@ -214,7 +209,11 @@ impl<T: pipe::Type, D: pipe::Direction> UsbPipe<T, D> for Pipe<T, D> {
         Ok(bytes)
     }
 
-    async fn request_out(&mut self, buf: &[u8], ensure_transaction_end: bool) -> Result<(), PipeError>
+    async fn request_out(
+        &mut self,
+        buf: &[u8],
+        ensure_transaction_end: bool,
+    ) -> Result<(), PipeError>
     where
         D: pipe::IsOut,
     {

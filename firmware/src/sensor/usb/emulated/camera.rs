@@ -84,6 +84,8 @@ pub struct Camera {
     at: usize,
     /// Time of the events when the camera's clock is zero.
     origin_us: u64,
+    /// What goes wrong, and before which event.
+    planned: VecDeque<(usize, Fault)>,
     /// Time of the world when the camera's clock was zero; `None` while it does not run.
     started_us: Option<u64>,
     next_gyro_us: u64,
@@ -134,6 +136,7 @@ impl Camera {
             events,
             at: 0,
             origin_us: 0,
+            planned: VecDeque::new(),
             started_us: None,
             next_gyro_us: 0,
             words,
@@ -286,11 +289,10 @@ impl Camera {
     /// Lets the world's time pass: what happens until then comes into the FIFO, or is lost there.
     pub fn run_until(&mut self, now_us: u64) {
         self.now_us = self.now_us.max(now_us);
-        let Some(started_us) = self.started_us else { return };
-        let clock_us = self.now_us.saturating_sub(started_us);
         let filters = self.filters();
         let gyro = self.model == Model::Davis346 && self.get(Register::new(Module::Imu, 3)) != 0;
-        loop {
+        while let Some(started_us) = self.started_us {
+            let clock_us = self.now_us.saturating_sub(started_us);
             let event = self
                 .events
                 .get(self.at)
@@ -305,6 +307,10 @@ impl Camera {
                     }
                 });
             } else if let Some(event) = event.filter(|_| event_us <= clock_us) {
+                if let Some((_, fault)) = self.planned.pop_front_if(|(at, _)| *at <= self.at) {
+                    self.fail(fault, started_us + event_us);
+                    continue;
+                }
                 self.at += 1;
                 self.seen += 1;
                 self.take(&event, started_us, &filters);
@@ -369,17 +375,23 @@ impl Camera {
         Packet::Data(packet)
     }
 
-    /// Something goes wrong from now on.
-    pub fn fail(&mut self, fault: Fault) {
+    /// Something goes wrong before so many events have happened; faults are planned in their order.
+    pub fn plan(&mut self, events: usize, fault: Fault) {
+        self.planned.push_back((events, fault));
+    }
+
+    /// Something goes wrong at a time of the world.
+    fn fail(&mut self, fault: Fault, world_us: u64) {
         match fault {
             Fault::Halt => self.halted = true,
             Fault::Dead => self.dead = true,
             Fault::Odd => self.odd = true,
             Fault::ClockReset => {
-                let Some(started_us) = self.started_us.replace(self.now_us) else { return };
-                self.origin_us += self.now_us - started_us;
+                // Events go on, at times that begin anew.
+                let Some(started_us) = self.started_us.replace(world_us) else { return };
+                self.origin_us += world_us - started_us;
                 self.next_gyro_us = 0;
-                self.send(self.now_us, |words, out| match words {
+                self.send(world_us, |words, out| match words {
                     Words::Davis(words) => words.reset(out),
                     Words::Dvxplorer(words) => words.reset(out),
                 });

@@ -1,0 +1,67 @@
+//! One stored event.
+
+use crate::event::PackedEvent;
+
+/// One event as the store keeps it, 8 bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StoredEvent {
+    /// Low 32 bits of the sensor time in microseconds: differences within a window are exact.
+    t_us: u32,
+    x: u16,
+    /// Row, weight and polarity.
+    y_weight_polarity: u16,
+}
+
+const POLARITY_BIT: u16 = 0x8000;
+/// Rows fit 11 bits ([`crate::Geometry::MAX_PX`]); the four above hold the weight.
+const ROW_BITS: u16 = 11;
+const ROW_MASK: u16 = (1 << ROW_BITS) - 1;
+const WEIGHT_MASK: u16 = 0xF << ROW_BITS;
+pub(super) const MOST_WEIGHT_LOG2: u8 = 15;
+
+impl StoredEvent {
+    #[inline]
+    pub(super) const fn store(event: PackedEvent, weight_log2: u8) -> Self {
+        let pixel = event.pixel_and_polarity();
+        let stored =
+            Self { t_us: event.low_us(), x: pixel as u16, y_weight_polarity: (pixel >> 16) as u16 };
+        stored.weighing(weight_log2)
+    }
+
+    #[inline]
+    pub(super) const fn weighing(self, weight_log2: u8) -> Self {
+        let most = if weight_log2 < MOST_WEIGHT_LOG2 { weight_log2 } else { MOST_WEIGHT_LOG2 };
+        let weight = (most as u16) << ROW_BITS;
+        Self { y_weight_polarity: (self.y_weight_polarity & !WEIGHT_MASK) | weight, ..self }
+    }
+
+    /// How many events this one stands for, as a power of two: the others were thinned.
+    #[must_use]
+    pub const fn weight_log2(self) -> u8 {
+        ((self.y_weight_polarity & WEIGHT_MASK) >> ROW_BITS) as u8
+    }
+
+    /// Column in pixels.
+    #[must_use]
+    pub const fn x(self) -> u16 {
+        self.x
+    }
+
+    /// Row in pixels.
+    #[must_use]
+    pub const fn y(self) -> u16 {
+        self.y_weight_polarity & ROW_MASK
+    }
+
+    /// Whether the pixel became brighter.
+    #[must_use]
+    pub const fn is_on(self) -> bool {
+        self.y_weight_polarity & POLARITY_BIT != 0
+    }
+
+    /// Time since `origin_us` in microseconds.
+    #[must_use]
+    pub const fn since(self, origin_us: u64) -> i32 {
+        self.t_us.wrapping_sub(origin_us as u32) as i32
+    }
+}

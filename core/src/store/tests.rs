@@ -1,0 +1,71 @@
+use super::*;
+use crate::event::{Event, PackedEvent, Polarity};
+
+fn event(t_us: u64) -> Event {
+    Event { t_us, x: (t_us % 300) as u16, y: 7, polarity: Polarity::On }
+}
+
+fn fill(store: &mut Store<'_>, times: impl Iterator<Item = u64>) {
+    for t_us in times {
+        while t_us >= store.open_end_us() {
+            store.close_segment();
+        }
+        store.push(&[PackedEvent::pack(&event(t_us))]);
+    }
+}
+
+fn times(store: &Store<'_>) -> Vec<i32> {
+    store.window(SEGMENTS, u64::MAX).events().map(|event| event.since(0)).collect()
+}
+
+#[test]
+fn a_segment_keeps_a_dense_burst_then_thins_evenly_and_counts_all() {
+    let mut memory = [StoredEvent::default(); 64 * SEGMENTS];
+    let mut store = Store::new(&mut memory, 100_000);
+    fill(&mut store, 0..5_000);
+    let kept = times(&store);
+    assert_eq!(&kept[..16], &(0..16).collect::<Vec<_>>()[..]);
+    assert!(kept.windows(2).all(|pair| pair[0] < pair[1]));
+    assert!(kept.len() <= 64 && kept.len() > 48);
+    assert!(*kept.last().unwrap_or(&0) > 4_500);
+    let account = store.account(1);
+    assert_eq!((account.counted, account.kept), (5_000, kept.len() as u64));
+}
+
+#[test]
+fn even_events_stand_for_the_same_number_each() {
+    let mut memory = [StoredEvent::default(); 64 * SEGMENTS];
+    let mut store = Store::new(&mut memory, 10_000);
+    fill(&mut store, 0..60_000);
+    let kept: Vec<_> = store
+        .window(6, u64::MAX)
+        .even(100, |event| Some(event.since(0)))
+        .1
+        .map(|(_, t_us)| t_us)
+        .collect();
+    assert!(kept.len() > 80 && kept.len() <= 101, "{}", kept.len());
+    // The reservoir itself comes in steps of 512.
+    assert!(kept.windows(2).all(|pair| (1..=1_024).contains(&(pair[1] - pair[0]))));
+    let first_half = kept.iter().filter(|t_us| **t_us < 30_000).count();
+    assert!(first_half.abs_diff(kept.len() - first_half) <= 2);
+}
+
+#[test]
+fn lengthening_keeps_order_counts_and_the_first_burst() {
+    let mut memory = [StoredEvent::default(); 64 * SEGMENTS];
+    let mut store = Store::new(&mut memory, 1_000);
+    fill(&mut store, (0..6_500).step_by(3));
+    let before = store.account(SEGMENTS);
+    assert_eq!(store.closed(), 6);
+    for segment_us in [2_000, 2_700, 5_400] {
+        store.lengthen(segment_us);
+        let kept = times(&store);
+        assert!(kept.windows(2).all(|pair| pair[0] < pair[1]), "{kept:?}");
+        assert_eq!(&kept[..4], &[0, 3, 6, 9]);
+        assert!(*kept.last().unwrap_or(&0) > 6_000);
+        assert_eq!(store.account(SEGMENTS).counted, before.counted);
+    }
+    assert_eq!(store.closed(), 1);
+    fill(&mut store, 6_500..40_000);
+    assert!(times(&store).windows(2).all(|pair| pair[0] < pair[1]));
+}

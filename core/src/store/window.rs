@@ -1,0 +1,150 @@
+//! What the store hands out: the events of a stretch of time, and where they went.
+
+use super::{SEGMENTS, Store, StoredEvent};
+
+impl Store<'_> {
+    /// The window over the oldest `segments` segments (the open one counts as the last when all closed
+    /// ones are taken), no longer than to `end_us`.
+    #[must_use]
+    pub fn window(&self, segments: usize, end_us: u64) -> Window<'_> {
+        let mut parts: [&[StoredEvent]; SEGMENTS] = [&[]; SEGMENTS];
+        let segments = segments.min(self.closed + 1);
+        for (index, part) in parts.iter_mut().enumerate().take(segments) {
+            let slot = self.slot(index);
+            let base = slot * self.capacity;
+            *part = &self.events[base..base + self.segments[slot].len];
+        }
+        Window {
+            parts,
+            start_us: self.start_us,
+            duration_us: (self.segment_us * segments as u32)
+                .min(end_us.saturating_sub(self.start_us).min(u64::from(u32::MAX)) as u32),
+            segments,
+        }
+    }
+
+    /// Events counted, kept and lost in the oldest `segments` segments.
+    #[must_use]
+    pub fn account(&self, segments: usize) -> Account {
+        let mut account = Account::default();
+        for index in 0..segments.min(self.closed + 1) {
+            let segment = &self.segments[self.slot(index)];
+            account.counted += segment.counted;
+            account.kept += segment.len as u64;
+            account.lost = account.lost.saturating_add(segment.lost);
+            account.roll_sum_rad_s += segment.roll_sum_rad_s;
+            account.roll_count += segment.roll_count;
+        }
+        account
+    }
+}
+
+/// Where the events of a window went.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Account {
+    /// Arrived.
+    pub counted: u64,
+    /// Stand in the store.
+    pub kept: u64,
+    /// Reported lost by the sensor or the link.
+    pub lost: u64,
+    /// Sum of the camera's roll rates.
+    roll_sum_rad_s: f32,
+    /// Number of roll rates.
+    roll_count: u32,
+}
+
+impl Account {
+    /// Mean roll rate of the camera in rad/s, where a gyro was heard.
+    #[must_use]
+    pub fn roll_rad_s(&self) -> Option<f32> {
+        (self.roll_count > 0).then(|| self.roll_sum_rad_s / self.roll_count as f32)
+    }
+}
+
+/// The stored events of a stretch of time, in time order.
+#[derive(Clone, Copy, Debug)]
+pub struct Window<'a> {
+    parts: [&'a [StoredEvent]; SEGMENTS],
+    /// Sensor time at which the window starts, in microseconds.
+    pub start_us: u64,
+    /// Length in microseconds.
+    pub duration_us: u32,
+    segments: usize,
+}
+
+impl<'a> Window<'a> {
+    /// All events, oldest first.
+    pub fn events(&self) -> impl Iterator<Item = StoredEvent> + use<'a> {
+        let parts = self.parts;
+        parts.into_iter().take(self.segments).flat_map(|part| part.iter().copied())
+    }
+
+    /// Events that each stand for the same number of arrived ones, at most `most` of those for which `inside` gives a value,
+    /// and how many of these are stored.
+    ///
+    /// The stored events are dense at the start of each segment; whoever looks for frequencies must not take
+    /// that rhythm for one of the scene.
+    pub fn even<T: Copy>(
+        &self,
+        most: usize,
+        inside: impl Fn(StoredEvent) -> Option<T>,
+    ) -> (usize, impl Iterator<Item = (StoredEvent, T)>) {
+        let (mut count, mut weight, mut coarsest) = (0, 0_u64, 0);
+        for event in self.events() {
+            if inside(event).is_some() {
+                count += 1;
+                weight += 1 << event.weight_log2();
+                coarsest = coarsest.max(event.weight_log2());
+            }
+        }
+        // Fixed-point, so that any ratio thins evenly.
+        let stride = ((weight << 8) / most.max(1) as u64 + 1).max(1 << (coarsest + 8));
+        let (mut passed, mut next) = (0_u64, 0_u64);
+        let even = self.events().filter_map(move |event| {
+            let value = inside(event)?;
+            let kept = passed >= next;
+            passed += 1 << (event.weight_log2() + 8);
+            if kept {
+                next += stride;
+            }
+            kept.then_some((event, value))
+        });
+        (count, even)
+    }
+
+    /// Number of stored events.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.parts.iter().take(self.segments).map(|part| part.len()).sum()
+    }
+
+    /// Whether nothing is stored.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Number of segments.
+    #[must_use]
+    pub const fn segments(&self) -> usize {
+        self.segments
+    }
+
+    /// The events of one segment: consecutive ones first, then ever sparser.
+    #[must_use]
+    pub fn segment(&self, segment: usize) -> &'a [StoredEvent] {
+        self.parts.get(segment).copied().unwrap_or(&[])
+    }
+
+    /// Events with `from_us <= t < to_us`, both in microseconds since the window's start. O(log n).
+    pub fn between(&self, from_us: i32, to_us: i32) -> impl Iterator<Item = StoredEvent> + use<'a> {
+        let start_us = self.start_us;
+        let parts = self.parts;
+        parts.into_iter().take(self.segments).flat_map(move |part| {
+            let from = part.partition_point(|event| event.since(start_us) < from_us);
+            let to = part.partition_point(|event| event.since(start_us) < to_us);
+            part[from..to.max(from)].iter().copied()
+        })
+    }
+}

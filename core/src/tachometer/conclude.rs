@@ -1,0 +1,147 @@
+//! From outcomes to a reading, and on to the next window.
+
+use heapless::Vec;
+
+use super::{BASE_WINDOW_US, Job, LONGEST_WINDOW_US, Tachometer, segment_us};
+use crate::limits::MAX_ROTORS;
+use crate::reading::{Evidence, Frame, Reading, Reason, RotorReading, Status};
+use crate::rotors::Disc;
+use crate::speed::measurement::Outcome;
+use crate::store::{SPARE_SEGMENTS, WINDOW_SEGMENTS};
+
+/// Windows that an adapting window steps through.
+const WINDOWS_US: [u32; 9] = [
+    BASE_WINDOW_US,
+    200_000,
+    300_000,
+    400_000,
+    600_000,
+    800_000,
+    1_200_000,
+    1_600_000,
+    LONGEST_WINDOW_US,
+];
+/// Segments by which the window moves on from reading to reading: 50 ms of 150.
+const HOP_SEGMENTS: usize = 2;
+/// Fewest events in a window that are looked at.
+const LEAST_EVENTS: u64 = 300;
+/// Share of events lost beyond which the rest is not trusted.
+const MOST_LOST: f32 = 0.5;
+/// Standard deviation of a gyro's zero-rate offset in rad/s, with the offset calibrated on a still camera.
+const GYRO_OFFSET_RAD_S: f32 = 3e-3;
+
+const _: () = assert!(SPARE_SEGMENTS >= HOP_SEGMENTS);
+
+impl Tachometer<'_> {
+    /// Turns the outcomes into a reading and moves the window on.
+    pub(super) fn conclude(&mut self) -> Reading {
+        let segments = self.window_segments;
+        let account = self.store.account(segments);
+        let window = self.store.window(segments, self.window_end_us);
+        let (start_us, window_us) = (window.start_us, window.duration_us);
+        self.tracker.start_reading();
+        let mut rotors = Vec::<RotorReading, MAX_ROTORS>::new();
+        for outcome in &self.outcomes {
+            let id = self.tracker.identify(outcome);
+            rotors.push(rotor_reading(id, outcome, account.roll_rad_s())).ok();
+        }
+        rotors.sort_unstable_by_key(|rotor| rotor.id);
+        let lost =
+            account.lost as f32 > MOST_LOST * account.counted.saturating_add(account.lost) as f32;
+        let status = if account.counted == 0 {
+            Status::Refused(Reason::NoEvents)
+        } else if account.counted < LEAST_EVENTS {
+            Status::Refused(Reason::TooFewEvents)
+        } else if lost && rotors.iter().all(|rotor| rotor.speed.is_none()) {
+            Status::Refused(Reason::Saturated)
+        } else {
+            best_status(&rotors, self.in_step_hz)
+        };
+        self.move_on(status);
+        Reading {
+            t_us: start_us + u64::from(window_us / 2),
+            window_us,
+            events: account.counted,
+            thinned: account.counted - account.kept,
+            lost: account.lost,
+            status,
+            rotors,
+        }
+    }
+
+    /// Chooses the next window: longer while a rotor or the search needs it, else a hop further.
+    fn move_on(&mut self, status: Status) {
+        self.window_segments = 0;
+        self.job = Job::Idle;
+        self.satisfied = status == Status::Locked;
+        if self.overrun {
+            // There is a hole behind what is stored. What is known of the rotors still holds.
+            let until_search = self.until_search;
+            self.restart(self.last_us);
+            self.until_search = until_search;
+            return;
+        }
+        let window_us = self.store.segment_us() * WINDOW_SEGMENTS as u32;
+        let wanted = self.outcomes.iter().map(|o| o.wanted_us).fold(0.0, f32::max);
+        let wanted =
+            if status.reason().is_some() { wanted.max(1.5 * window_us as f32) } else { wanted };
+        let adapts = self.settings.window_us.is_none();
+        if adapts && wanted > window_us as f32 * 1.02 && window_us < LONGEST_WINDOW_US {
+            let longer = WINDOWS_US.iter().find(|w| **w as f32 >= wanted);
+            self.target_us = longer.copied().unwrap_or(LONGEST_WINDOW_US);
+            self.store.lengthen(segment_us(self.target_us));
+        } else if status.reason().is_some() && adapts {
+            // Nothing even in the longest window: begin again with a short one.
+            self.restart(self.last_us);
+        } else {
+            for _ in 0..HOP_SEGMENTS {
+                self.store.drop_oldest();
+                self.heat.fade(WINDOW_SEGMENTS as u16);
+            }
+        }
+    }
+}
+
+fn rotor_reading(id: u8, outcome: &Outcome, roll_rad_s: Option<f32>) -> RotorReading {
+    let mut speed = outcome.speed;
+    if let Some(speed) = &mut speed {
+        // The gyro serves where its offset is smaller than what the hand may have rolled.
+        let mut roll_sigma = outcome.roll_sigma_rad_s;
+        if let Some(roll_rad_s) = roll_rad_s.filter(|_| GYRO_OFFSET_RAD_S < roll_sigma) {
+            speed.omega_rad_s -= roll_rad_s;
+            speed.frame = Frame::Room;
+            roll_sigma = GYRO_OFFSET_RAD_S;
+        }
+        let sigma = speed.omega_sigma_rad_s;
+        speed.omega_sigma_rad_s = crate::math::sqrt(sigma * sigma + roll_sigma * roll_sigma);
+    }
+    let Disc { x_px, y_px, radius_px } = outcome.found.disc;
+    let evidence: Evidence = outcome.evidence;
+    let (blades, status) = (outcome.parts, outcome.status);
+    RotorReading { id, x_px, y_px, radius_px, blades, status, speed, evidence }
+}
+
+/// The best status among the rotors, or why there is none.
+fn best_status(rotors: &[RotorReading], in_step_hz: Option<f32>) -> Status {
+    let has = |status: Status| rotors.iter().any(|rotor| rotor.status == status);
+    if has(Status::Locked) {
+        Status::Locked
+    } else if has(Status::Coarse) {
+        Status::Coarse
+    } else if let Some(first) = rotors.first() {
+        first.status
+    } else if in_step_hz.is_some_and(is_mains) {
+        Status::Refused(Reason::Flicker)
+    } else {
+        Status::Refused(Reason::NoRotation)
+    }
+}
+
+/// Whether a frequency is twice that of the mains, or a multiple: lamps.
+fn is_mains(hz: f32) -> bool {
+    [100.0, 120.0].iter().any(|mains| {
+        let ratio = hz / mains;
+        let nearest = libm::roundf(ratio);
+        nearest >= 1.0 && (ratio - nearest).abs() * mains < 4.0
+    })
+}

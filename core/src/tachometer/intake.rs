@@ -1,0 +1,189 @@
+//! Taking in: events, gyro samples, and what was lost; segments and windows as time goes on.
+
+use heapless::Vec;
+
+use super::gate::{Gate, Outside};
+use super::{BASE_WINDOW_US, FIRST_WINDOW_US, Job, LONGEST_WINDOW_US, Tachometer, segment_us};
+use crate::event::{Event, GyroSample, PackedEvent};
+use crate::store::WINDOW_SEGMENTS;
+
+/// Time going back by more than this restarts the window; less is disorder, and the event is left out.
+const CLOCK_RESET_US: u64 = 1_000_000;
+/// Latest sensor time that is believed: beyond it (292 000 years) sums of times could overflow.
+const LATEST_US: u64 = u64::MAX / 2;
+/// Events that are packed before they are taken in.
+const PACKED_AT_ONCE: usize = 128;
+/// Fastest roll that is believed, in rad/s: gyros in cameras end at 2000 degrees a second (35 rad/s).
+const FASTEST_ROLL_RAD_S: f32 = 100.0;
+
+impl Tachometer<'_> {
+    /// Takes in events in time order; never waits for a measurement.
+    pub fn push(&mut self, events: &[Event]) {
+        let mut packed = Vec::<PackedEvent, PACKED_AT_ONCE>::new();
+        let mut rest = events;
+        while let Some(first) = rest.first() {
+            packed.clear();
+            let mut before_us = first.t_us;
+            for event in rest {
+                // Further apart, the low bits of the times would not tell them apart.
+                if event.t_us.abs_diff(before_us) > i32::MAX as u64
+                    || packed.push(PackedEvent::pack(event)).is_err()
+                {
+                    break;
+                }
+                before_us = event.t_us;
+            }
+            self.push_packed(first.t_us, &packed);
+            rest = &rest[packed.len()..];
+        }
+    }
+
+    /// Takes in events of which the first is of the time `first_us` in microseconds, and each other lies within 35 minutes
+    /// of the one before.
+    ///
+    /// Cost: `evtach bench cost`; besides, one pass over the heat map for each segment that ends.
+    pub fn push_packed(&mut self, first_us: u64, events: &[PackedEvent]) {
+        let (mut rest, mut before_us) = (events, first_us);
+        loop {
+            let seen = self.take_in(rest, &mut before_us);
+            rest = &rest[seen..];
+            let Some((event, later)) = rest.split_first() else { return };
+            let event = event.unpack(before_us);
+            before_us = event.t_us;
+            self.push_one(&event);
+            rest = later;
+        }
+    }
+
+    /// Takes in events as long as nothing but the counts changes with them, and returns how many; `before_us` becomes
+    /// the time of the last of them.
+    fn take_in(&mut self, events: &[PackedEvent], before_us: &mut u64) -> usize {
+        let end_us = if self.overrun { u64::MAX } else { self.store.open_end_us() };
+        let far = before_us.abs_diff(self.last_us) > CLOCK_RESET_US;
+        if !self.started || far {
+            return 0;
+        }
+        let gate = Gate::new(&self.settings, self.last_us, end_us.min(LATEST_US + 1));
+        let Some(mut gate) = gate else { return 0 };
+        let mut heat = self.heat.counter();
+        let mut taken = 0;
+        loop {
+            let rest = &events[taken..];
+            let passed = if self.overrun {
+                let passed = gate.admit_uncounted(rest);
+                self.ignored.overrun += passed as u64;
+                passed
+            } else {
+                let passed = gate.admit(rest, &mut heat);
+                self.store.push(&rest[..passed]);
+                passed
+            };
+            taken += passed;
+            let Some(stopped) = events.get(taken) else { break };
+            match gate.outside(*stopped) {
+                Some(Outside::Sensor) => self.ignored.out_of_bounds += 1,
+                Some(Outside::Roi) => self.ignored.out_of_roi += 1,
+                None => break,
+            }
+            taken += 1;
+        }
+        if let Some(last) = events[..taken].last() {
+            let reached_us = self.last_us + u64::from(gate.since(self.last_us as u32));
+            *before_us = last.unpack(reached_us).t_us;
+            self.last_us = reached_us;
+        }
+        taken
+    }
+
+    fn push_one(&mut self, event: &Event) {
+        if !self.settings.geometry.contains(event.x, event.y) {
+            self.ignored.out_of_bounds += 1;
+            return;
+        }
+        if self.settings.roi.is_some_and(|roi| !roi.contains(event.x, event.y)) {
+            self.ignored.out_of_roi += 1;
+            return;
+        }
+        if event.t_us > LATEST_US {
+            self.ignored.out_of_order += 1;
+            return;
+        }
+        if event.t_us < self.last_us && self.started {
+            if self.last_us - event.t_us < CLOCK_RESET_US {
+                self.ignored.out_of_order += 1;
+                return;
+            }
+            self.started = false;
+        }
+        if !self.started {
+            self.restart(event.t_us);
+        }
+        self.last_us = event.t_us;
+        if event.t_us >= self.store.open_end_us() && !self.overrun {
+            self.advance(event.t_us);
+        }
+        if self.overrun {
+            self.ignored.overrun += 1;
+            return;
+        }
+        self.heat.counter().add(event.x.into(), event.y.into());
+        self.store.push(&[PackedEvent::pack(event)]);
+    }
+
+    /// Forgets the window; rotors keep their letters.
+    pub(super) fn restart(&mut self, t_us: u64) {
+        self.started = true;
+        self.overrun = false;
+        self.window_segments = 0;
+        self.job = Job::Idle;
+        self.target_us = self.settings.window_us.unwrap_or(BASE_WINDOW_US);
+        self.store.restart(t_us, segment_us(FIRST_WINDOW_US.min(self.target_us)));
+        self.heat.clear();
+        self.until_search = 0;
+    }
+
+    /// Closes segments until the open one holds `t_us`.
+    fn advance(&mut self, t_us: u64) {
+        let gap_us = t_us - self.store.open_end_us();
+        if gap_us > u64::from(LONGEST_WINDOW_US) && self.window_segments == 0 {
+            // Nothing for longer than any window: what went before says nothing about what comes.
+            self.restart(t_us);
+            return;
+        }
+        while t_us >= self.store.open_end_us() {
+            if self.store.full() {
+                self.overrun = true;
+                return;
+            }
+            self.store.close_segment();
+            let window_us = self.store.segment_us() * WINDOW_SEGMENTS as u32;
+            if self.window_segments == 0 && self.store.closed() >= WINDOW_SEGMENTS {
+                if window_us + WINDOW_SEGMENTS as u32 <= self.target_us {
+                    self.store.lengthen(segment_us(self.target_us.min(2 * window_us)));
+                } else {
+                    self.start(WINDOW_SEGMENTS);
+                }
+            }
+        }
+    }
+
+    /// Counts events that the sensor or the link lost.
+    pub fn lost(&mut self, count: u64) {
+        self.store.lost(count);
+    }
+
+    /// Takes in a gyro sample. One that no gyro gives (not a number, or faster than any measures) is left out.
+    pub fn gyro(&mut self, sample: GyroSample) {
+        let believed = sample.roll_rad_s.abs() <= FASTEST_ROLL_RAD_S;
+        if self.started && believed {
+            self.store.roll(sample.roll_rad_s);
+        }
+    }
+
+    /// Ends the stream: what is in the window is to be measured even if the window is not full.
+    pub fn finish(&mut self) {
+        if self.started && self.window_segments == 0 && !self.satisfied {
+            self.start((self.store.closed() + 1).min(WINDOW_SEGMENTS));
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! The running measurement, step by step.
+
+use super::{Job, Scratch, Suspect, Tachometer};
+use crate::reading::{Reason, Status};
+use crate::rotors::extraction::{self, Extraction, View};
+use crate::rotors::{Disc, Visits};
+use crate::settings::Poll;
+use crate::speed::measurement::{Bench, Measurement, Outcome, Stated};
+
+/// Following a rotor, every so many readings the whole image is searched again.
+const SEARCH_EVERY: u8 = 10;
+
+impl Tachometer<'_> {
+    /// Starts measuring the window over the oldest segments.
+    pub(super) fn start(&mut self, segments: usize) {
+        self.window_segments = segments;
+        self.window_end_us = self.last_us + 1;
+        self.candidates.clear();
+        self.outcomes.clear();
+        self.in_step_hz = None;
+        let known = self.tracker.known().iter().filter(|known| known.can_be_followed());
+        for known in known {
+            let followed = Some((known.parts, known.alike));
+            self.candidates.push(Suspect { found: known.found, followed }).ok();
+        }
+        if self.until_search == 0 || self.candidates.is_empty() {
+            self.candidates.clear();
+            self.search();
+        } else {
+            self.until_search -= 1;
+            self.measure_next(0);
+        }
+    }
+
+    fn search(&mut self) {
+        self.until_search = SEARCH_EVERY;
+        if !matches!(self.scratch, Scratch::Search(_)) {
+            self.scratch = Scratch::Search(extraction::Scratch::default());
+        }
+        self.job = Job::Search(Extraction::default());
+    }
+
+    /// Advances the measurement by at most `steps` steps, each of a few million instructions at most (`evtach bench cost`).
+    pub fn poll(&mut self, steps: u32) -> Poll {
+        for _ in 0..steps {
+            if self.window_segments == 0 {
+                return Poll::Idle;
+            }
+            if self.step() {
+                return Poll::Ready(self.conclude());
+            }
+        }
+        Poll::Pending
+    }
+
+    /// One step of the running job; `true` once the window has been measured.
+    fn step(&mut self) -> bool {
+        let window = self.store.window(self.window_segments, self.window_end_us);
+        match &mut self.job {
+            Job::Idle => true,
+            Job::Search(extraction) => {
+                let grid = Visits::grid(self.settings.geometry, self.weights.len());
+                let Some(weights) = self.weights.get_mut(..grid.len()) else { return true };
+                let mut view = View { window, grid, weights };
+                let Scratch::Search(scratch) = &mut self.scratch else { return true };
+                if extraction.step(&mut view, &mut self.polar, &mut self.spectrum, scratch) {
+                    self.in_step_hz = extraction.in_step_hz();
+                    for candidate in extraction.candidates() {
+                        self.candidates.push(Suspect { found: *candidate, followed: None }).ok();
+                    }
+                    return self.measure_next(0);
+                }
+                false
+            }
+            Job::Measure(index, measurement) => {
+                let Scratch::Measure(bench) = &mut self.scratch else { return true };
+                let stated = Stated {
+                    blades: self.settings.blades,
+                    clock_sigma_ppm: self.settings.clock_sigma_ppm,
+                };
+                if !measurement.step(&window, &stated, &mut self.polar, bench) {
+                    return false;
+                }
+                let (index, outcome) = (*index, measurement.result());
+                let followed = self.candidates.get(index).is_some_and(|c| c.followed.is_some());
+                if followed && outcome.status != Status::Locked {
+                    // Lost: look at the whole image again, in this very window.
+                    self.candidates.clear();
+                    self.outcomes.clear();
+                    self.search();
+                    return false;
+                }
+                self.keep(outcome);
+                self.measure_next(index + 1)
+            }
+        }
+    }
+
+    /// Keeps an outcome unless it says that nothing turns there.
+    fn keep(&mut self, outcome: Outcome) {
+        if outcome.status == Status::Refused(Reason::NoRotation) {
+            return;
+        }
+        let rank = |outcome: &Outcome| match outcome.status {
+            Status::Locked => 2,
+            Status::Coarse => 1,
+            Status::Refused(_) => 0,
+        };
+        let place = outcome.found.disc;
+        let rival = self.outcomes.iter_mut().find(|o| o.found.disc.overlaps(&place));
+        match rival {
+            // The rotor that was measured stands, whatever else was thought to be in its place.
+            Some(rival) if rank(&outcome) > rank(rival) => *rival = outcome,
+            Some(_) => {}
+            None => {
+                self.outcomes.push(outcome).ok();
+            }
+        }
+    }
+
+    /// Starts measuring the next candidate from `index` on that no measured rotor overlaps; `true` when none is left.
+    fn measure_next(&mut self, index: usize) -> bool {
+        let taken = |disc: &Disc| {
+            let measured = |o: &&Outcome| o.status.reason().is_none();
+            self.outcomes.iter().filter(measured).any(|o| o.found.disc.overlaps(disc))
+        };
+        let next = (index..self.candidates.len()).find(|i| !taken(&self.candidates[*i].found.disc));
+        let Some(next) = next else {
+            self.job = Job::Idle;
+            return true;
+        };
+        if !matches!(self.scratch, Scratch::Measure(_)) {
+            self.scratch = Scratch::Measure(Bench::EMPTY);
+        }
+        let Suspect { found, followed } = self.candidates[next];
+        let measurement = match followed {
+            Some((parts, alike)) => Measurement::follow(&found, parts, alike),
+            None => Measurement::new(&found),
+        };
+        self.job = Job::Measure(next, measurement);
+        false
+    }
+}
