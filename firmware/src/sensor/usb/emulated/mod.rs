@@ -9,13 +9,12 @@ mod words;
 
 use std::vec::Vec;
 
-use evtach_core::Event;
 use evtach_core::decode::Mounting;
+use evtach_core::{Event, PackedEvent};
 
 use super::Model;
 use super::stream::Stream;
-use crate::sensor::outlet::Words as _;
-
+use crate::sensor::outlet::{Filled, Words as _};
 
 pub use camera::{Camera, Fault, Filters, Packet, Stalled};
 pub use port::{Act, Device, Pipe, Port, World};
@@ -33,7 +32,13 @@ pub fn decode<'t>(
     for transfer in transfers {
         let mut words = stream.words(transfer);
         while !words.is_done() {
-            words.decode(usize::MAX, |event| events.push(event));
+            let mut space = [PackedEvent::ZERO; 64];
+            let Filled { events: count, mut near_us, .. } = words.fill(&mut space);
+            for packed in &space[..count] {
+                let event = packed.unpack(near_us);
+                near_us = event.t_us;
+                events.push(event);
+            }
         }
     }
     (events, stream.unknown() + u64::from(stream.odd_bytes))
