@@ -138,9 +138,10 @@ fn flash(elf: &[u8]) -> Result<Vec<u8>, object::Error> {
     let header = elf::FileHeader32::<Endianness>::parse(elf)?;
     let endian = header.endian()?;
     // Where a segment is loaded, which for variables is not where they are.
-    let segments = header.program_headers(endian, elf)?.iter().filter(|segment| {
-        segment.p_type(endian) == elf::PT_LOAD && segment.p_filesz(endian) > 0
-    });
+    let segments = header
+        .program_headers(endian, elf)?
+        .iter()
+        .filter(|segment| segment.p_type(endian) == elf::PT_LOAD && segment.p_filesz(endian) > 0);
     let start = segments.clone().map(|segment| segment.p_paddr(endian)).min().unwrap_or(0);
     let mut flash = Vec::new();
     for segment in segments {
