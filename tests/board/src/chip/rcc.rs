@@ -5,7 +5,6 @@ use super::{Device, plain::Plain};
 const CR: u32 = 0x00;
 const PLLCFGR: u32 = 0x04;
 const CFGR: u32 = 0x08;
-const APB1RSTR: u32 = 0x20;
 const BDCR: u32 = 0x70;
 const CSR: u32 = 0x74;
 const DCKCFGR1: u32 = 0x8c;
@@ -117,11 +116,6 @@ impl Rcc {
             2 => self.words.get(PLLCFGR) & 1 << 22 != 0,
             _ => false,
         }
-    }
-
-    /// Whether APB1 holds this peripheral in reset.
-    pub fn apb1_reset(&self, bit: u32) -> bool {
-        self.words.get(APB1RSTR) & 1 << bit != 0
     }
 }
 

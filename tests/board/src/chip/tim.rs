@@ -167,7 +167,8 @@ impl Device for Tim {
         }
         let mut least = NEVER;
         if wanted & UIF != 0 {
-            least = least.min(u64::from(self.get(ARR)) + 1 - u64::from(self.count.min(self.get(ARR))));
+            least =
+                least.min(u64::from(self.get(ARR)) + 1 - u64::from(self.count.min(self.get(ARR))));
         }
         for channel in 0..4 {
             if wanted & 2 << channel != 0

@@ -174,7 +174,6 @@ pub struct Host {
     pub broken: u32,
     /// What crossed the port.
     pub traffic: Traffic,
-    busy: u64,
 }
 
 impl Default for Host {
@@ -197,7 +196,6 @@ impl Default for Host {
             began: 0,
             broken: 0,
             traffic: Traffic::default(),
-            busy: 0,
         }
     }
 }
@@ -234,11 +232,6 @@ impl Host {
             }
             self.port &= !(PCSTS | PENA | PRST);
         }
-    }
-
-    /// What is plugged in.
-    pub fn attached(&mut self) -> Option<&mut Attached> {
-        self.attached.as_mut()
     }
 
     fn dma(&self) -> bool {
@@ -329,7 +322,6 @@ impl Host {
             Answer::Nak | Answer::Stall => NAK_PS,
             Answer::Silence => ERROR_PS,
         };
-        self.busy += takes;
         self.flight = Some(Flight { channel: index, answer, ends: now + takes });
     }
 
@@ -621,8 +613,7 @@ impl Device for Host {
     }
 
     fn reset(&mut self) {
-        let (attached, traffic, broken) =
-            (self.attached.take(), self.traffic, self.broken);
+        let (attached, traffic, broken) = (self.attached.take(), self.traffic, self.broken);
         *self = Self { attached, traffic, broken, ..Self::default() };
     }
 }
