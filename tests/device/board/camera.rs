@@ -1,6 +1,7 @@
 //! What a camera at the port sees, read by the device: the PC's readings to the bit.
 
 use evtach_core::Event;
+use evtach_firmware::sensor::spi::{Bridge, Kind};
 use evtach_host::measure::{Capacity, ReadingRow};
 use evtach_host::synth::{Rotor, Scene};
 use evtach_tests::{Loaded, load, measure, recordings, show};
@@ -42,8 +43,28 @@ fn assert_reads_as_the_pc(camera: Camera, sees: &Loaded, rotors: usize, status: 
     board.assert_sound();
 }
 
+/// No camera: the button is held while power comes, and a recording in the serial flash is played.
 #[test]
-fn one_rotor() {
+fn a_recording_in_the_serial_flash_is_replayed() {
+    let Some(mut board) = Board::switch_on() else { return };
+    let sees = one_rotor(1500.0, 3000.0);
+    let mut bridge = Bridge::new(Kind::Evt2, sees.geometry, "a fan");
+    let mut stream = Vec::new();
+    for event in &sees.events {
+        bridge.push(event, |frame| stream.extend_from_slice(frame));
+    }
+    bridge.end(|frame| stream.extend_from_slice(frame));
+    board.flash(1 << 20, &stream);
+    board.hold_button();
+    board.break_("power_cut");
+    let speed = board.wait_for(6.0, "FETC?", |answer| !answer.starts_with("9.91"));
+    let rpm: f64 = speed.parse().expect("a number");
+    assert!((rpm / 1500.0 - 1.0).abs() < 0.01, "{speed}");
+    assert!(board.defmt_log().iter().any(|line| line.contains("serial flash is played")));
+}
+
+#[test]
+fn one_rotor_before_a_davis346() {
     assert_reads_as_the_pc(Camera::Davis346, &one_rotor(1500.0, 400.0), 1, "locked");
 }
 
