@@ -308,7 +308,7 @@ impl Camera {
                 });
             } else if let Some(event) = event.filter(|_| event_us <= clock_us) {
                 if let Some((_, fault)) = self.planned.pop_front_if(|(at, _)| *at <= self.at) {
-                    self.fail(fault, started_us + event_us);
+                    self.fail_at(fault, started_us + event_us);
                     continue;
                 }
                 self.at += 1;
@@ -380,8 +380,13 @@ impl Camera {
         self.planned.push_back((events, fault));
     }
 
+    /// Something goes wrong now.
+    pub fn fail(&mut self, fault: Fault) {
+        self.fail_at(fault, self.now_us);
+    }
+
     /// Something goes wrong at a time of the world.
-    fn fail(&mut self, fault: Fault, world_us: u64) {
+    fn fail_at(&mut self, fault: Fault, world_us: u64) {
         match fault {
             Fault::Halt => self.halted = true,
             Fault::Dead => self.dead = true,
