@@ -231,6 +231,7 @@ mod tests {
         assert_eq!(tim.read(SR, 4, 0x8000 * US), 2);
         tim.write(SR, !2, 4, 0x8000 * US);
         assert_eq!(tim.next(), 0x1_0000 * US);
-        assert_eq!(tim.read(SR, 4, 0x1_0000 * US), 1);
+        // The other channels compare with zero.
+        assert_eq!(tim.read(SR, 4, 0x1_0000 * US) & 3, 1);
     }
 }
