@@ -1,11 +1,11 @@
 //! The events in a frame.
 
 use evtach_core::decode::{Evt2, Evt3};
-use evtach_core::{Event, GyroSample};
+use evtach_core::{Event, PackedEvent};
 
 use super::frame::Kind;
 use super::parser::Frame;
-use crate::sensor::outlet;
+use crate::sensor::outlet::{self, Filled};
 
 /// Most events that one word of EVT 3 stands for: a vector.
 const VECTOR_EVENTS: usize = 12;
@@ -84,18 +84,24 @@ impl<'f> Words<'f> {
 
 /// A bridge sends no gyro samples.
 impl outlet::Words for Words<'_> {
-    fn most_events_a_word(&self) -> usize {
-        self.most_events_a_word()
-    }
-
     fn is_done(&self) -> bool {
         self.is_done()
     }
 
-    #[inline]
-    fn decode(&mut self, words: usize, emit: impl FnMut(Event)) -> Option<GyroSample> {
-        self.decode(words, emit);
-        None
+    fn fill(&mut self, space: &mut [PackedEvent]) -> Filled {
+        let words = space.len() / self.most_events_a_word();
+        let (room, mut first_us) = (space.len(), None);
+        let mut places = space.iter_mut();
+        self.decode(words, |event| {
+            if first_us.is_none() {
+                first_us = Some(event.t_us);
+            }
+            if let Some(place) = places.next() {
+                *place = PackedEvent::pack(&event);
+            }
+        });
+        let events = room - places.len();
+        Filled { events, near_us: first_us.unwrap_or_default(), sample: None }
     }
 }
 
