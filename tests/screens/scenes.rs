@@ -291,7 +291,7 @@ fn picture(rotors: &[Rotor]) -> Picture {
             }
         }
         for _ in 0..events.max(0.0) as u32 {
-            heat.add(x as u16, y as u16);
+            heat.counter().add(x as u32, y as u32);
         }
     }
     let mut picture = Picture::EMPTY;

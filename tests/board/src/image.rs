@@ -44,7 +44,11 @@ impl Image {
                 }
                 let place = at.checked_sub(FLASH).map(|at| at as usize);
                 let Some(place) = place.filter(|at| at + bytes.len() <= FLASH_BYTES) else {
-                    bail!("{}: {} bytes for {at:#010x}, which is no flash", path.display(), bytes.len());
+                    bail!(
+                        "{}: {} bytes for {at:#010x}, which is no flash",
+                        path.display(),
+                        bytes.len()
+                    );
                 };
                 flash[place..place + bytes.len()].copy_from_slice(bytes);
                 loaded += bytes.len();

@@ -13,6 +13,7 @@ use crate::chip::ltdc::Picture;
 use crate::chip::rcc::Cause;
 use crate::cpu::{self, Engine, nvic};
 use crate::image::{FLASH, FLASH_BYTES, Image, instructions};
+use crate::injury::Injury;
 use crate::rtt::Rtt;
 use crate::time::{MS, NEVER, Pulse, S};
 
@@ -117,6 +118,8 @@ pub struct Machine {
     pub slept: u64,
     /// Power goes in the middle of the next write to the serial flash; then it knows when.
     cut: Cut,
+    /// What will be done to the program.
+    pub injury: Option<Injury>,
 }
 
 impl Machine {
@@ -137,7 +140,8 @@ impl Machine {
             engine.mem_map(u64::from(at), bytes, permission)
         };
         map(&mut engine, 0, ITCM_BYTES, Permission::ALL).map_err(failed)?;
-        map(&mut engine, FLASH, FLASH_BYTES, Permission::READ | Permission::EXEC).map_err(failed)?;
+        map(&mut engine, FLASH, FLASH_BYTES, Permission::READ | Permission::EXEC)
+            .map_err(failed)?;
         map(&mut engine, RAM, RAM_BYTES, Permission::ALL).map_err(failed)?;
         engine.mem_map(SYSTEM_MEMORY, 0x1_0000, Permission::READ).map_err(failed)?;
         engine.mem_write(u64::from(FLASH), &image.flash).map_err(failed)?;
@@ -184,6 +188,7 @@ impl Machine {
             broken_word,
             slept: 0,
             cut: Cut::None,
+            injury: None,
         };
         machine.hook().map_err(failed)?;
         machine.lose_memory();
@@ -221,8 +226,8 @@ impl Machine {
                     *known = (size, instructions(code) as u32);
                     known.1
                 }
-                // Code in RAM: two thirds of the instructions are short.
-                None => size / 3,
+                // There is none in RAM but the loop of an injury.
+                None => size / 2,
             };
             pulse.spend(u64::from(count));
         })?;
@@ -310,8 +315,9 @@ impl Machine {
         };
         self.engine
             .add_mem_hook(HookType::MEM_READ, u64::from(at), u64::from(at) + 3, hook)
-            .map_err(|error| anyhow!("the engine: {error:?}"))?;
-        Ok(())
+            // What was translated before reads past the hook.
+            .and_then(|_| self.engine.ctl_flush_tb())
+            .map_err(|error| anyhow!("the engine: {error:?}"))
     }
 
     /// Power goes in the middle of the next write to the serial flash.
@@ -379,6 +385,10 @@ impl Machine {
             }
             if self.sleep != Sleep::Locked && cpu::unmasked(&self.engine, priority) {
                 self.enter(exception);
+                let strikes = |injury: &mut Injury| injury.exception == usize::from(exception);
+                if let Some(injury) = self.injury.take_if(strikes) {
+                    injury.strike(&mut self.engine, &self.image)?;
+                }
             }
         }
         if self.sleep == Sleep::Event && self.event.take() {
@@ -423,7 +433,10 @@ impl Machine {
         board.disturbed();
         if let Err(error) = entered {
             let place = self.image.place(cpu::register(&self.engine, R::LR));
-            self.faults.push(format!("{}: no frame for it at {place}: {error:?}", cpu::name(exception.into())));
+            self.faults.push(format!(
+                "{}: no frame for it at {place}: {error:?}",
+                cpu::name(exception.into())
+            ));
         }
     }
 
@@ -444,7 +457,9 @@ impl Machine {
         let ended = self.engine.emu_start(from, NOWHERE, 0, 0);
         let pc = cpu::register(&self.engine, R::PC);
         match (self.stop.get(), ended) {
-            (Stop::Plain, Ok(())) => bail!("the engine stopped at {} by itself", self.image.place(pc)),
+            (Stop::Plain, Ok(())) => {
+                bail!("the engine stopped at {} by itself", self.image.place(pc))
+            }
             (Stop::Before(at), _) => {
                 cpu::set_register(&mut self.engine, R::PC, at);
                 Ok(())
@@ -466,7 +481,9 @@ impl Machine {
                 self.board.borrow_mut().nvic.pend(nvic::SV_CALL);
                 Ok(())
             }
-            (Stop::Exception(number), _) => self.fault(&format!("exception {number} of the engine"), 0),
+            (Stop::Exception(number), _) => {
+                self.fault(&format!("exception {number} of the engine"), 0)
+            }
             (Stop::Access(at, writes), _) => {
                 let what = if writes { "write to" } else { "read of" };
                 {
@@ -514,8 +531,8 @@ impl Machine {
     /// What is on the panel.
     pub fn picture(&mut self) -> Option<Picture> {
         let board = Rc::clone(&self.board);
-        let picture = board.borrow().ltdc.picture(&Ram(&mut self.engine));
-        picture
+        let board = board.borrow();
+        board.ltdc.picture(&Ram(&mut self.engine))
     }
 
     /// Bytes of the stack that were never written since power came, between two symbols of the image.

@@ -12,6 +12,7 @@ mod board;
 mod chip;
 mod cpu;
 mod image;
+mod injury;
 mod live;
 mod machine;
 mod rtt;
@@ -27,7 +28,11 @@ use clap::Parser;
 
 /// Runs a firmware image on an emulated STM32F746G-DISCO.
 #[derive(Parser)]
-#[command(version, about, after_help = "Lines on stdin say what is done with the device; see src/script.rs.")]
+#[command(
+    version,
+    about,
+    after_help = "Lines on stdin say what is done with the device; see src/script.rs."
+)]
 struct Args {
     /// The image, as it is flashed.
     image: PathBuf,

@@ -9,12 +9,15 @@
 //! | `camera` | what the camera has seen, left out and dropped, as JSON |
 //! | `fault halt`, `fault dead`, `fault odd`, `fault clock` | the camera's endpoint halts, for good, sends an odd byte, resets its clock |
 //! | `break_wire N` | the next N transactions are not answered |
+//! | `crash panic HANDLER`, `undefined`, `hang` | the program goes wrong in the handler of this exception |
 //! | `touch X Y`, `lift`, `press`, `release` | a finger on the screen; the blue button |
 //! | `serial TEXT`, `read` | to and from the serial port, escaped as Rust does |
 //! | `query S TEXT` | sends a line and waits so many seconds for one |
 //! | `lcd FILE.png`, `log FILE` | what is on the panel; what the device logged so far |
 //! | `pc plug`, `pc unplug` | the cable of the PC |
 //! | `break_sdram OFFSET` | one bit of SDRAM reads as zero |
+//! | `stop_crystal` | the crystal stops, for good |
+//! | `flash OFFSET FILE` | a programmer writes a file into the serial flash |
 //! | `power_cut`, `power_cut_writing` | power goes and comes back; in the middle of the next write to the serial flash |
 //! | `reset` | the black button |
 //! | `report` | instructions, interrupts, traffic, faults, as JSON |
@@ -34,6 +37,8 @@ use serde_json::json;
 
 use crate::chip::rcc::Cause;
 use crate::cpu;
+use crate::cpu::nvic;
+use crate::injury::Injury;
 use crate::machine::Machine;
 use crate::time::{MS, S};
 use crate::usb::camera::{Plugged, Stick};
@@ -89,7 +94,8 @@ fn unescape(text: &str) -> Result<Vec<u8>> {
 
 fn events(path: &str) -> Result<Vec<Event>> {
     let bytes = std::fs::read(path).with_context(|| path.to_owned())?;
-    let (header, records) = bytes.split_first_chunk().ok_or_else(|| anyhow!("{path}: too short"))?;
+    let (header, records) =
+        bytes.split_first_chunk().ok_or_else(|| anyhow!("{path}: too short"))?;
     let header = Header::parse(header).map_err(|error| anyhow!("{path}: {error}"))?;
     let mut decoder = Decoder::new(header.first_us);
     let (records, _) = records.as_chunks::<RECORD_BYTES>();
@@ -118,6 +124,7 @@ impl Script {
             "unplug" => self.unplug(rest)?,
             "camera" => return self.camera(),
             "fault" => self.fault(rest)?,
+            "crash" => self.machine.injury = Some(Injury::parse(rest)?),
             "break_wire" => self.machine.board.borrow_mut().host.broken = number(rest)?,
             "touch" => {
                 let (x, y) = rest.split_once(' ').ok_or_else(|| anyhow!("touch X Y"))?;
@@ -142,6 +149,21 @@ impl Script {
                 board.disturbed();
             }
             "break_sdram" => self.machine.break_sdram(number(rest)?)?,
+            "stop_crystal" => {
+                let mut board = self.machine.board.borrow_mut();
+                if board.rcc.stop_crystal() {
+                    board.nvic.pend(nvic::NMI);
+                }
+                board.clocks_changed();
+                board.disturbed();
+            }
+            "flash" => {
+                let (at, path) = rest.split_once(' ').ok_or_else(|| anyhow!("flash OFFSET FILE"))?;
+                let (at, bytes): (usize, _) = (number(at)?, std::fs::read(path).with_context(|| path.to_owned())?);
+                let mut board = self.machine.board.borrow_mut();
+                let cells = board.quadspi.flash.cells.get_mut(at..at + bytes.len());
+                cells.ok_or_else(|| anyhow!("{path} does not fit"))?.copy_from_slice(&bytes);
+            }
             "power_cut" => {
                 self.machine.board.borrow_mut().power_off();
                 self.run_until(self.machine.now() + MS)?;
@@ -221,7 +243,8 @@ impl Script {
             _ => bail!("fault halt, dead, odd, clock"),
         };
         let camera = self.camera.as_ref().ok_or_else(|| anyhow!("there is no camera"))?;
-        camera.borrow_mut().fail(fault);
+        // Before any further event.
+        camera.borrow_mut().plan(0, fault);
         Ok(())
     }
 
@@ -278,7 +301,8 @@ impl Script {
     pub fn lcd(&mut self, path: &Path) -> Result<String> {
         let picture = self.machine.picture().ok_or_else(|| anyhow!("the panel is off"))?;
         let file = File::create(path).with_context(|| format!("{}", path.display()))?;
-        let mut encoder = png::Encoder::new(BufWriter::new(file), picture.width_px, picture.height_px);
+        let mut encoder =
+            png::Encoder::new(BufWriter::new(file), picture.width_px, picture.height_px);
         encoder.set_color(png::ColorType::Rgb);
         encoder.write_header()?.write_image_data(&picture.rgb)?;
         Ok(format!("{}x{}", picture.width_px, picture.height_px))

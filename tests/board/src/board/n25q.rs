@@ -83,9 +83,12 @@ impl N25q {
         self.page.clear();
         let reset = std::mem::take(&mut self.reset_enabled);
         match command {
-            0x9e | 0x9f | 0xaf | 0x5a | 0x05 | 0x70 | 0x85 | 0x65 | 0xb5 | 0x03 | 0x0b | 0x3b | 0x6b
-            | 0xbb | 0xeb => {
-                if !matches!(command, 0x05 | 0x70 | 0x85 | 0x65 | 0xb5 | 0x03 | 0x0b | 0x3b | 0x6b | 0xbb | 0xeb) {
+            0x9e | 0x9f | 0xaf | 0x5a | 0x05 | 0x70 | 0x85 | 0x65 | 0xb5 | 0x03 | 0x0b | 0x3b
+            | 0x6b | 0xbb | 0xeb => {
+                if !matches!(
+                    command,
+                    0x05 | 0x70 | 0x85 | 0x65 | 0xb5 | 0x03 | 0x0b | 0x3b | 0x6b | 0xbb | 0xeb
+                ) {
                     self.at = 0;
                 }
                 Direction::Out
@@ -155,7 +158,8 @@ impl N25q {
                 return;
             }
             0x81 | 0x61 if self.write_enabled => {
-                let register = if command == 0x81 { &mut self.volatile } else { &mut self.enhanced };
+                let register =
+                    if command == 0x81 { &mut self.volatile } else { &mut self.enhanced };
                 *register = self.page.first().copied().unwrap_or(*register);
                 self.write_enabled = false;
                 return;

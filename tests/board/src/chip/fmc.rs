@@ -2,7 +2,6 @@
 
 use super::{Device, plain::Plain};
 
-const SDCR1: u32 = 0x140;
 const SDCMR: u32 = 0x150;
 const SDSR: u32 = 0x158;
 /// Commands to bank 1 in the order that the SDRAM asks for: clock, precharge, refresh, mode.
@@ -19,11 +18,6 @@ impl Fmc {
     /// Whether the SDRAM was started as it must be.
     pub fn is_ready(&self) -> bool {
         self.done == SEQUENCE.len()
-    }
-
-    /// Columns, rows, width and banks as they are set.
-    pub fn control(&self) -> u32 {
-        self.words.get(SDCR1)
     }
 }
 

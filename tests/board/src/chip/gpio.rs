@@ -28,13 +28,6 @@ impl Gpio {
         let mode = self.registers[0] >> (2 * pin) & 3;
         (mode == 1).then_some(self.registers[(ODR / 4) as usize] & 1 << pin != 0)
     }
-
-    /// Number of the alternate function of a pin, when it has one.
-    pub fn function(&self, pin: u8) -> Option<u8> {
-        let mode = self.registers[0] >> (2 * pin) & 3;
-        let functions = self.registers[8 + usize::from(pin) / 8];
-        (mode == 2).then_some((functions >> (4 * (pin % 8)) & 0xf) as u8)
-    }
 }
 
 impl Device for Gpio {

@@ -246,9 +246,8 @@ impl Device for I2c {
     fn lines(&self, nvic: &mut Nvic) {
         // TXIE, RXIE, NACKIE, STOPIE, TCIE in CR1 stand one bit before their flags.
         let wanted = [(1, TXIS), (2, RXNE), (4, NACKF), (5, STOPF), (6, TC | TCR)];
-        let high = wanted
-            .iter()
-            .any(|(bit, flags)| self.cr1 & 1 << bit != 0 && self.status & flags != 0);
+        let high =
+            wanted.iter().any(|(bit, flags)| self.cr1 & 1 << bit != 0 && self.status & flags != 0);
         nvic.set_line(self.event_line, high);
     }
 

@@ -25,6 +25,8 @@ const FPCA: u32 = 1 << 2;
 const SPSEL: u32 = 1 << 1;
 /// Bit of a stacked xPSR: the stack pointer was moved to a multiple of eight.
 const ALIGNED: u32 = 1 << 9;
+/// Bits of xPSR: an IT block is under way.
+const IT_STATE: u32 = 0x0600_fc00;
 /// The Thumb bit of xPSR.
 const THUMB: u32 = 1 << 24;
 
@@ -50,6 +52,10 @@ pub fn unmasked(engine: &Unicorn<'_, ()>, priority: i16) -> bool {
         // A fault passes PRIMASK; only its like keeps it off.
         return true;
     }
+    // The engine cuts an IT block where a page of 1 KB ends, and does not stack how far it was: the next block comes soon.
+    if register(engine, R::XPSR) & IT_STATE != 0 {
+        return false;
+    }
     let base = register(engine, R::BASEPRI) & 0xf0;
     register(engine, R::PRIMASK) & 1 == 0
         && register(engine, R::FAULTMASK) & 1 == 0
@@ -60,7 +66,12 @@ pub fn unmasked(engine: &Unicorn<'_, ()>, priority: i16) -> bool {
 ///
 /// # Errors
 /// When the frame or the vector cannot be reached. The handler of a fault starts all the same: its stack is then lost.
-pub fn enter(engine: &mut Engine, nvic: &mut Nvic, exception: u16, vtor: u32) -> Result<u32, uc_error> {
+pub fn enter(
+    engine: &mut Engine,
+    nvic: &mut Nvic,
+    exception: u16,
+    vtor: u32,
+) -> Result<u32, uc_error> {
     let control = register(engine, R::CONTROL);
     let from_thread = nvic.depth() == 0;
     let on_process_stack = from_thread && control & SPSEL != 0;
@@ -199,6 +210,8 @@ pub fn name(exception: usize) -> String {
         44 => "TIM8_UP_TIM13".to_owned(),
         45 => "TIM8_TRG_COM_TIM14".to_owned(),
         50 => "TIM5".to_owned(),
+        52 => "UART4".to_owned(),
+        53 => "UART5".to_owned(),
         54 => "TIM6_DAC".to_owned(),
         55 => "TIM7".to_owned(),
         67 => "OTG_FS".to_owned(),
@@ -206,6 +219,7 @@ pub fn name(exception: usize) -> String {
         73 => "I2C3_ER".to_owned(),
         74 => "OTG_HS_EP1_OUT".to_owned(),
         77 => "OTG_HS".to_owned(),
+        82 => "UART7".to_owned(),
         88 => "LTDC".to_owned(),
         92 => "QUADSPI".to_owned(),
         _ => format!("IRQ{line}"),

@@ -55,7 +55,11 @@ impl SysTick {
     }
 
     fn next(&self, pulse: &Pulse) -> u64 {
-        if self.ctrl & 1 == 0 || self.load == 0 { NEVER } else { self.loaded + self.period_ps(pulse) }
+        if self.ctrl & 1 == 0 || self.load == 0 {
+            NEVER
+        } else {
+            self.loaded + self.period_ps(pulse)
+        }
     }
 }
 
@@ -124,7 +128,14 @@ impl System {
     }
 
     /// Writes, by the offset from 0xE0000000.
-    pub fn write(&mut self, at: u32, value: u32, size: u8, nvic: &mut Nvic, pulse: &Pulse) -> Asked {
+    pub fn write(
+        &mut self,
+        at: u32,
+        value: u32,
+        size: u8,
+        nvic: &mut Nvic,
+        pulse: &Pulse,
+    ) -> Asked {
         match at {
             0x1004 => self.cycles_from = pulse.now.get(),
             0xe010 => {

@@ -291,7 +291,7 @@ impl Device for Port {
             DCFG => self.core.config,
             DCTL => self.core.control,
             // Full speed; a frame every millisecond.
-            DSTS => 3 << 1 | (now / crate::time::MS) as u32 % 0x4000 << 8,
+            DSTS => 3 << 1 | ((now / crate::time::MS) as u32 % 0x4000) << 8,
             DIEPMSK => self.core.masks[0],
             DOEPMSK => self.core.masks[1],
             DAINT => self.core.all_interrupts(),

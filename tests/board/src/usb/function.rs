@@ -45,11 +45,19 @@ pub struct Stall;
 enum Control {
     Idle,
     /// Sends an answer, then takes an empty packet.
-    Answering { bytes: Vec<u8>, at: usize },
+    Answering {
+        bytes: Vec<u8>,
+        at: usize,
+    },
     /// Takes data for a request.
-    Taking { setup: [u8; 8], bytes: Vec<u8> },
+    Taking {
+        setup: [u8; 8],
+        bytes: Vec<u8>,
+    },
     /// Sends an empty packet; then this address stands.
-    Acknowledging { address: Option<u8> },
+    Acknowledging {
+        address: Option<u8>,
+    },
     Stalled,
 }
 

@@ -26,7 +26,6 @@ pub mod int {
     pub const SOF: u32 = 1 << 3;
     pub const RXFLVL: u32 = 1 << 4;
     pub const NPTXFE: u32 = 1 << 5;
-    pub const USBSUSP: u32 = 1 << 11;
     pub const USBRST: u32 = 1 << 12;
     pub const ENUMDNE: u32 = 1 << 13;
     pub const IEP: u32 = 1 << 18;
@@ -35,8 +34,6 @@ pub mod int {
     pub const HC: u32 = 1 << 25;
     pub const PTXFE: u32 = 1 << 26;
     pub const DISC: u32 = 1 << 29;
-    pub const SRQ: u32 = 1 << 30;
-    pub const WKUP: u32 = 1 << 31;
 }
 
 /// Bit of GAHBCFG: the core moves data by itself.
@@ -44,8 +41,15 @@ pub const DMAEN: u32 = 1 << 5;
 /// Bit of GRSTCTL: the bus is idle. Resets and flushes are over at once.
 const AHBIDL: u32 = 1 << 31;
 /// Bits of GINTSTS that stand for something else and cannot be cleared.
-const DERIVED: u32 =
-    int::CMOD | int::OTG | int::RXFLVL | int::NPTXFE | int::PTXFE | int::IEP | int::OEP | int::HPRT | int::HC;
+const DERIVED: u32 = int::CMOD
+    | int::OTG
+    | int::RXFLVL
+    | int::NPTXFE
+    | int::PTXFE
+    | int::IEP
+    | int::OEP
+    | int::HPRT
+    | int::HC;
 
 /// A core reset or a flush was asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use super::channel::{CHDIS, CHENA, Channel, hcint};
 use super::function::{Answer, Attached, Function};
 use super::globals::{DMAEN, Globals, at, int};
 use crate::chip::{Device, Memory};
@@ -29,20 +30,6 @@ const POCCHNG: u32 = 1 << 5;
 const PRST: u32 = 1 << 8;
 const PPWR: u32 = 1 << 12;
 
-const CHENA: u32 = 1 << 31;
-const CHDIS: u32 = 1 << 30;
-
-/// Bits of a channel's interrupts.
-mod hcint {
-    pub const XFRC: u32 = 1;
-    pub const CHH: u32 = 1 << 1;
-    pub const STALL: u32 = 1 << 3;
-    pub const NAK: u32 = 1 << 4;
-    pub const ACK: u32 = 1 << 5;
-    pub const TXERR: u32 = 1 << 7;
-    pub const DTERR: u32 = 1 << 10;
-}
-
 /// Packet status in the receive FIFO.
 const IN_DATA: u32 = 2;
 const IN_DONE: u32 = 3;
@@ -69,58 +56,6 @@ pub enum Unplug {
     Quiet,
     /// Errors on open channels, and not a word from the port.
     ErrorsOnly,
-}
-
-#[derive(Clone, Debug, Default)]
-struct Channel {
-    character: u32,
-    interrupts: u32,
-    mask: u32,
-    size: u32,
-    dma: u32,
-    /// Wants the bus.
-    active: bool,
-    /// Not before this: its device had nothing.
-    parked: u64,
-    /// Words written to the FIFO for it.
-    out: Vec<u8>,
-    /// A halt that will be reported then.
-    halting: u64,
-}
-
-impl Channel {
-    fn max_packet(&self) -> usize {
-        (self.character & 0x7ff) as usize
-    }
-    fn endpoint(&self) -> u8 {
-        (self.character >> 11 & 0xf) as u8
-    }
-    fn is_in(&self) -> bool {
-        self.character & 1 << 15 != 0
-    }
-    fn address(&self) -> u8 {
-        (self.character >> 22 & 0x7f) as u8
-    }
-    fn length(&self) -> usize {
-        (self.size & 0x7_ffff) as usize
-    }
-    fn packets(&self) -> u32 {
-        self.size >> 19 & 0x3ff
-    }
-    fn pid(&self) -> u32 {
-        self.size >> 29 & 3
-    }
-    fn set_length(&mut self, length: usize) {
-        self.size = self.size & !0x7_ffff | length as u32 & 0x7_ffff;
-    }
-    fn set_packets(&mut self, packets: u32) {
-        self.size = self.size & !(0x3ff << 19) | (packets & 0x3ff) << 19;
-    }
-    fn toggle(&mut self) {
-        // DATA0 is 0, DATA1 is 2; after a setup comes DATA1.
-        let next = if self.pid() == 0 || self.pid() == 3 { 2 } else { 0 };
-        self.size = self.size & !(3 << 29) | next << 29;
-    }
 }
 
 /// A word of the receive FIFO with what belongs to it.
@@ -174,7 +109,6 @@ pub struct Host {
     pub broken: u32,
     /// What crossed the port.
     pub traffic: Traffic,
-    busy: u64,
 }
 
 impl Default for Host {
@@ -197,7 +131,6 @@ impl Default for Host {
             began: 0,
             broken: 0,
             traffic: Traffic::default(),
-            busy: 0,
         }
     }
 }
@@ -234,11 +167,6 @@ impl Host {
             }
             self.port &= !(PCSTS | PENA | PRST);
         }
-    }
-
-    /// What is plugged in.
-    pub fn attached(&mut self) -> Option<&mut Attached> {
-        self.attached.as_mut()
     }
 
     fn dma(&self) -> bool {
@@ -329,7 +257,6 @@ impl Host {
             Answer::Nak | Answer::Stall => NAK_PS,
             Answer::Silence => ERROR_PS,
         };
-        self.busy += takes;
         self.flight = Some(Flight { channel: index, answer, ends: now + takes });
     }
 
@@ -362,7 +289,7 @@ impl Host {
                     channel.dma += fits as u32;
                     channel.interrupts |= hcint::ACK;
                     if done {
-                        finish(channel, hcint::XFRC | hcint::CHH);
+                        channel.finish(hcint::XFRC | hcint::CHH);
                     }
                 } else {
                     let status = |kind, count| index as u32 | count << 4 | pid << 15 | kind << 17;
@@ -395,7 +322,7 @@ impl Host {
                 }
                 channel.interrupts |= hcint::ACK;
                 if channel.packets() == 0 || channel.length() == 0 {
-                    finish(channel, hcint::XFRC | hcint::CHH);
+                    channel.finish(hcint::XFRC | hcint::CHH);
                 }
             }
             Answer::Nak => {
@@ -418,10 +345,10 @@ impl Host {
                     channel.active = false;
                 }
             }
-            Answer::Stall => finish(channel, hcint::STALL | if dma { hcint::CHH } else { 0 }),
+            Answer::Stall => channel.finish(hcint::STALL | if dma { hcint::CHH } else { 0 }),
             Answer::Silence => {
                 self.traffic.errors += 1;
-                finish(channel, hcint::TXERR | if dma { hcint::CHH } else { 0 });
+                channel.finish(hcint::TXERR | if dma { hcint::CHH } else { 0 });
             }
         }
     }
@@ -482,14 +409,6 @@ impl Host {
             channel.character &= !CHENA;
         }
         packet.status
-    }
-}
-
-fn finish(channel: &mut Channel, interrupts: u32) {
-    channel.interrupts |= interrupts;
-    channel.active = false;
-    if interrupts & hcint::CHH != 0 {
-        channel.character &= !(CHENA | CHDIS);
     }
 }
 
@@ -621,8 +540,7 @@ impl Device for Host {
     }
 
     fn reset(&mut self) {
-        let (attached, traffic, broken) =
-            (self.attached.take(), self.traffic, self.broken);
+        let (attached, traffic, broken) = (self.attached.take(), self.traffic, self.broken);
         *self = Self { attached, traffic, broken, ..Self::default() };
     }
 }

@@ -4,6 +4,7 @@
 //! silicon they prove nothing.
 
 pub mod camera;
+pub mod channel;
 pub mod device;
 pub mod function;
 pub mod globals;

@@ -250,8 +250,11 @@ impl Pc {
                     // A bulk endpoint.
                     if *kind == 5 && rest.get(1) == Some(&2) {
                         let address = rest[0];
-                        let which =
-                            if address & 0x80 != 0 { &mut self.data_in } else { &mut self.data_out };
+                        let which = if address & 0x80 != 0 {
+                            &mut self.data_in
+                        } else {
+                            &mut self.data_out
+                        };
                         *which = address & 0xf;
                     }
                     at += usize::from(*length).max(2);
