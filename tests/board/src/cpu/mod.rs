@@ -109,7 +109,9 @@ pub fn enter(
         link |= PROCESS_STACK;
     }
     nvic.enter(exception);
-    set_register(engine, R::IPSR, u32::from(exception));
+    // No IT block reaches into the handler.
+    const IT: u32 = 0x0600_fc00;
+    set_register(engine, R::XPSR_NZCVQG, xpsr & !(IT | 0x1ff) | u32::from(exception));
     set_register(engine, R::CONTROL, control & !(FPCA | if from_thread { SPSEL } else { 0 }));
     set_register(engine, R::LR, link);
     let mut vector = [0; 4];
