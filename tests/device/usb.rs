@@ -11,7 +11,7 @@ use embassy_time::{Duration, MockDriver, Timer};
 use embassy_usb_driver::Speed;
 use embassy_usb_host::BusState;
 use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
-use evtach_core::{Event, Memory, Reading, Settings, Status, StoredEvent, Tachometer};
+use evtach_core::{Event, GyroSample, Memory, Reading, Settings, Status, StoredEvent, Tachometer};
 use evtach_firmware::cost::{Costs, Spent};
 use evtach_firmware::intake::{BLOCKS, Block, Pace};
 use evtach_firmware::measure::{Companion, measure};
@@ -76,7 +76,11 @@ fn compare(model: Model, scene: Scene) {
     let geometry = model.geometry();
     let scene = Scene { width_px: geometry.width_px, height_px: geometry.height_px, ..scene };
     let events = synth::generate(&scene).expect("a scene in range").events;
-    let (here, _) = measure_events(&events, &[], Settings::new(geometry), Capacity::Device);
+    // The DAVIS has a gyro, which says a thousand times a second that the camera does not roll.
+    let milliseconds = if model == Model::Davis346 { 0..scene.duration_ms as u64 } else { 0..0 };
+    let gyro: Vec<GyroSample> =
+        milliseconds.map(|ms| GyroSample { t_us: ms * 1_000, roll_rad_s: 0.0 }).collect();
+    let (here, _) = measure_events(&events, &gyro, Settings::new(geometry), Capacity::Device);
     let count = events.len() as u64;
     let (there, acquired) = read_over_usb(model, events);
     assert_eq!(acquired.delivered.used(), count, "{acquired}");

@@ -1,6 +1,6 @@
 //! iniVation DAVIS (DAVIS346 and kin): 16-bit USB words.
 
-use super::inivation::Clock;
+use super::inivation::{CLOCK_RESET, Clock};
 use super::{Packed, polarity};
 use crate::event::{Event, GyroSample, PackedEvent};
 
@@ -79,7 +79,8 @@ impl Davis {
         None
     }
 
-    /// Decodes words into `events`, until either is used up, or a gyro sample is complete. Times are `offset_us` later than
+    /// Decodes words into `events`, until either is used up, or a gyro sample is complete, or
+    /// the clock is set to zero. Times are `offset_us` later than
     /// the camera's, and never earlier than `reached_us`, which they move on.
     pub fn pack(
         &mut self,
@@ -103,11 +104,20 @@ impl Davis {
                 code @ (2 | 3) => {
                     let Some(place) = places.next() else {
                         *reached_us = t_us;
-                        return Packed { words: index, events: room, sample: None };
+                        return Packed { words: index, events: room, sample: None, reset: false };
                     };
                     let (x, y) =
                         if self.mounting.swap_xy { (self.row, data) } else { (data, self.row) };
                     *place = PackedEvent::new(t_us as u32, x, y, polarity(code == 3));
+                }
+                _ if word == CLOCK_RESET => {
+                    let reset = index == 0;
+                    if reset {
+                        self.clock.reset();
+                    }
+                    *reached_us = t_us;
+                    let events = room - places.len();
+                    return Packed { words: index.max(1), events, sample: None, reset };
                 }
                 _ => {
                     let sample = self.decode(word, |_| {});
@@ -117,13 +127,14 @@ impl Davis {
                         let words = index + 1;
                         let t_us = offset_us.wrapping_add(sample.t_us);
                         let sample = Some(GyroSample { t_us, ..sample });
-                        return Packed { words, events: room - places.len(), sample };
+                        let events = room - places.len();
+                        return Packed { words, events, sample, reset: false };
                     }
                 }
             }
         }
         *reached_us = t_us;
-        Packed { words: words.len(), events: room - places.len(), sample: None }
+        Packed { words: words.len(), events: room - places.len(), sample: None, reset: false }
     }
 
     fn special(&mut self, data: u16) -> Option<GyroSample> {

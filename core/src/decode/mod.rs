@@ -28,6 +28,8 @@ pub struct Packed {
     pub events: usize,
     /// A gyro sample that the last of them completed.
     pub sample: Option<GyroSample>,
+    /// Whether the last of them, then the only one, set the camera's clock to zero.
+    pub reset: bool,
 }
 
 /// The polarity a wire bit stands for: set means brighter in every format read here.

@@ -68,7 +68,8 @@ fn one_rotor_before_a_davis346() {
 
 #[test]
 fn four_rotors() {
-    let at = |x_px, y_px, rpm| Rotor { x_px, y_px, rpm, radius_px: 18.0, blades: 2, ..Rotor::default() };
+    let at =
+        |x_px, y_px, rpm| Rotor { x_px, y_px, rpm, radius_px: 18.0, blades: 2, ..Rotor::default() };
     let rotors = vec![
         at(90.0, 70.0, 1400.0),
         at(250.0, 70.0, -1520.0),
@@ -105,7 +106,8 @@ fn a_refusal() {
 
 #[test]
 fn one_rotor_before_a_dvxplorer() {
-    let rotor = Rotor { rpm: 1200.0, radius_px: 24.0, x_px: 400.0, y_px: 300.0, ..Rotor::default() };
+    let rotor =
+        Rotor { rpm: 1200.0, radius_px: 24.0, x_px: 400.0, y_px: 300.0, ..Rotor::default() };
     let scene = Scene {
         width_px: DVXPLORER.width_px,
         height_px: DVXPLORER.height_px,
@@ -122,8 +124,10 @@ fn the_real_spinning_dot() {
     let dot = load(&folder.join("spinning-dot.evt2.raw")).expect("a recording");
     // Its middle, moved to where the camera's pixels are.
     let half = |wide: u16, narrow: u16| wide.saturating_sub(narrow) / 2;
-    let (left, top) =
-        (half(dot.geometry.width_px, DAVIS346.width_px), half(dot.geometry.height_px, DAVIS346.height_px));
+    let (left, top) = (
+        half(dot.geometry.width_px, DAVIS346.width_px),
+        half(dot.geometry.height_px, DAVIS346.height_px),
+    );
     let events = dot.events.iter().filter_map(|event| {
         let (x, y) = (event.x.checked_sub(left)?, event.y.checked_sub(top)?);
         DAVIS346.contains(x, y).then_some(Event { x, y, ..*event })
@@ -131,7 +135,9 @@ fn the_real_spinning_dot() {
     let sees = Loaded { geometry: DAVIS346, events: from_zero(events.collect()) };
     let (readings, _) = measure(&sees, Capacity::Device);
     let Some(first) = readings.first() else {
-        show("skipped: the part of the spinning dot that a DAVIS346 would see is too short for a reading");
+        show(
+            "skipped: the part of the spinning dot that a DAVIS346 would see is too short for a reading",
+        );
         return;
     };
     let (rotors, status) = (first.rotors.len(), first.status.as_str());

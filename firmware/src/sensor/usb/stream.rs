@@ -9,9 +9,6 @@ use crate::sensor::outlet::{Filled, Words};
 /// Step of the time when the camera's clock begins anew: longer than any window, so that none spans it.
 const GAP_US: u64 = 3_000_000;
 
-/// The word by which the camera tells that its clock was set to zero.
-const CLOCK_RESET: [u8; 2] = 1_u16.to_le_bytes();
-
 /// The words of a camera, and the time that they tell.
 #[derive(Clone, Debug)]
 pub(super) struct Stream {
@@ -100,16 +97,9 @@ impl Words for TransferWords<'_> {
 
     fn fill(&mut self, space: &mut [PackedEvent]) -> Filled {
         let near_us = self.stream.reached_us;
-        // Whatever goes before a reset of the clock is told by the clock before.
-        let whole = self.rest.iter().position(|word| *word == CLOCK_RESET);
-        let (now, _) = self.rest.split_at(whole.unwrap_or(self.rest.len()));
-        let mut packed = self.stream.pack(now, space);
-        if whole == Some(packed.words) && packed.sample.is_none() {
-            let (reset, _) = self.rest.split_at(packed.words + 1);
-            // It gives no event, but a decoder wants room for some.
-            self.stream.pack(&reset[packed.words..], &mut [PackedEvent::ZERO; 8]);
+        let packed = self.stream.pack(self.rest, space);
+        if packed.reset {
             self.stream.reset();
-            packed.words += 1;
         }
         self.rest = self.rest.get(packed.words..).unwrap_or_default();
         Filled { events: packed.events, near_us, sample: packed.sample }
