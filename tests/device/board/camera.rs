@@ -1,7 +1,6 @@
 //! What a camera at the port sees, read by the device: the PC's readings to the bit.
 
 use evtach_core::Event;
-use evtach_firmware::sensor::spi::{Bridge, Kind};
 use evtach_core::decode::dvxplorer::Dvxplorer;
 use evtach_firmware::sensor::usb::emulated::DvxplorerWords;
 use evtach_host::measure::{Capacity, ReadingRow};
@@ -62,26 +61,6 @@ fn assert_reads_as_the_pc(camera: Camera, sees: &Loaded, rotors: usize, status: 
     board.assert_sound();
 }
 
-/// No camera: the button is held while power comes, and a recording in the serial flash is played.
-#[test]
-fn a_recording_in_the_serial_flash_is_replayed() {
-    let Some(mut board) = Board::switch_on() else { return };
-    let sees = one_rotor(1500.0, 3000.0);
-    let mut bridge = Bridge::new(Kind::Evt2, sees.geometry, "a fan");
-    let mut stream = Vec::new();
-    for event in &sees.events {
-        bridge.push(event, |frame| stream.extend_from_slice(frame));
-    }
-    bridge.end(|frame| stream.extend_from_slice(frame));
-    board.flash(1 << 20, &stream);
-    board.hold_button();
-    board.break_("power_cut");
-    let speed = board.wait_for(6.0, "FETC?", |answer| !answer.starts_with("9.91"));
-    let rpm: f64 = speed.parse().expect("a number");
-    assert!((rpm / 1500.0 - 1.0).abs() < 0.01, "{speed}");
-    assert!(board.defmt_log().iter().any(|line| line.contains("serial flash is played")));
-}
-
 #[test]
 fn one_rotor_before_a_davis346() {
     assert_reads_as_the_pc(Camera::Davis346, &one_rotor(1500.0, 400.0), 1, "locked");
@@ -108,10 +87,8 @@ fn four_rotors() {
     let pc = ReadingRow::new(readings.first().expect("a reading on the PC"), 0);
     assert_eq!(pc.rotors.len(), 4);
     for rotor in &pc.rotors {
-        let device: f64 = board
-            .query(&format!("CONF {};:CALC:AVER:MAX?", rotor.id))
-            .parse()
-            .expect("a speed");
+        let device: f64 =
+            board.query(&format!("CONF {};:CALC:AVER:MAX?", rotor.id)).parse().expect("a speed");
         assert_eq!(Some(device), rotor.rpm, "rotor {}", rotor.id);
     }
     board.assert_sound();
