@@ -1,7 +1,7 @@
 //! What a camera at the port sees, read by the device: the PC's readings to the bit.
 
 use evtach_core::Event;
-use evtach_core::decode::dvxplorer::Dvxplorer;
+use evtach_core::decode::Dvxplorer;
 use evtach_firmware::sensor::usb::emulated::DvxplorerWords;
 use evtach_host::measure::{Capacity, ReadingRow};
 use evtach_host::synth::{Rotor, Scene};
