@@ -16,6 +16,8 @@ const FOLLOWING_PAIRS: u32 = 3;
 const PAIR_EVENTS: usize = 1_024;
 /// Step of the refinement in symmetry periods (paper: eta x half an angle of symmetry, eta = 0.8).
 pub(super) const REFINEMENT_PERIODS: f32 = 0.4;
+/// Part of a symmetry period that the fractional-baseline test stops short by.
+pub(super) const FRACTION: f32 = 0.35;
 /// Baseline of the lock as a share of the window.
 const LOCK_SHARE: f32 = 2.0 / 3.0;
 /// A step to m periods is safe while three standard errors stay below this share of a period.
@@ -106,7 +108,7 @@ impl Measurement {
             }
         }
         let pairs = if self.follows { 1 } else { FRACTIONAL_PAIRS };
-        self.plan(window, (longest - 0.35).max(0.65), pairs);
+        self.plan(window, (longest - FRACTION).max(0.65), pairs);
         self.stage = Stage::Fractional;
     }
 
