@@ -16,11 +16,13 @@ use crate::reading::{Evidence, Frame, Reason, Speed, Status};
 use crate::registration::Icp;
 use crate::rotors::{Disc, Found};
 use crate::store::{WINDOW_SEGMENTS, Window};
-use baselines::{REFINEMENT_PAIRS, REFINEMENT_PERIODS};
+use baselines::{REFINEMENT, REFINEMENT_PERIODS};
 use doubt::{DOUBTFUL, Doubt};
 
 /// Steps of centre and speed by the polar phase.
 const NEWTON_STEPS: u8 = 6;
+/// A step that moves the centre, and the rim at the window's ends, by less than this is the last.
+const LAST_STEP_PX: f32 = 0.1;
 /// Relative error of the speed of a rotor that is followed from window to window.
 const FOLLOWING_SIGMA: f32 = 1e-3;
 /// Share in step of the second best harmonic over that of the best: beyond this the pattern stands, or the centre is off.
@@ -228,15 +230,18 @@ impl Measurement {
     fn newton(&mut self, window: &Window<'_>, polar: &mut PolarTrack) {
         if self.turn == 0 {
             self.events = track(window, self.disc, polar);
+            self.turn = 1;
+            return;
         }
         self.evidence.events = self.events as u32;
         if self.events < LEAST_EVENTS {
             return self.refuse(Reason::TooFewEvents);
         }
-        if self.turn < NEWTON_STEPS {
-            self.turn += 1;
-            if !self.step_centre(window, polar) {
-                self.refuse(Reason::NoRotation);
+        if self.turn <= NEWTON_STEPS {
+            match self.step_centre(window, polar) {
+                None => self.refuse(Reason::NoRotation),
+                Some(true) => self.turn = NEWTON_STEPS + 1,
+                Some(false) => self.turn += 1,
             }
             return;
         }
@@ -326,7 +331,7 @@ impl Measurement {
             let parts = if self.alike { u32::from(self.parts.unwrap_or(1)).max(1) } else { 1 };
             let pose =
                 Pose::new(self.disc, self.omega_rad_s, parts, self.harmonic, window.duration_us);
-            let pose = if self.alike { pose } else { pose.unlike() };
+            let pose = if self.alike { pose } else { pose.unlike(self.parts.unwrap_or(1)) };
             self.pose = if self.follows { pose.known() } else { pose };
         }
         if !self.pose.step(window, sums) {
@@ -364,17 +369,18 @@ impl Measurement {
         self.stage = Stage::Lock;
     }
 
-    /// One Newton step of centre and speed; `false` when the phase gives none.
-    fn step_centre(&mut self, window: &Window<'_>, polar: &mut PolarTrack) -> bool {
-        let found = newton(polar, self.disc, self.omega_rad_s, self.harmonic, window.duration_us);
-        let Some(step) = found else { return false };
+    /// One Newton step of centre and speed: whether it was so small that it is the last, or `None` when the phase gives none.
+    fn step_centre(&mut self, window: &Window<'_>, polar: &mut PolarTrack) -> Option<bool> {
+        let step = newton(polar, self.disc, self.omega_rad_s, self.harmonic, window.duration_us)?;
         let reach_px = 0.3 * self.disc.radius_px;
         // Not `clamp`, whose panic on a wrong order of bounds pulls float formatting into the image.
         self.disc.x_px += step.dx_px.max(-reach_px).min(reach_px);
         self.disc.y_px += step.dy_px.max(-reach_px).min(reach_px);
         self.omega_rad_s += step.domega_rad_s;
         self.events = track(window, self.disc, polar);
-        true
+        let half_s = 0.5e-6 * window.duration_us as f32;
+        let turned_px = step.domega_rad_s * half_s * self.disc.radius_px;
+        Some(step.dx_px.abs().max(step.dy_px.abs()).max(turned_px.abs()) < LAST_STEP_PX)
     }
 
     /// Initial alignment in every other segment: second coarse witness.
@@ -419,7 +425,7 @@ impl Measurement {
             self.stage = Stage::Verdict;
             return;
         }
-        self.plan(window, REFINEMENT_PERIODS, self.worth(REFINEMENT_PAIRS));
+        self.plan(window, REFINEMENT_PERIODS, self.worth(REFINEMENT));
         self.stage = Stage::Refinement;
     }
 

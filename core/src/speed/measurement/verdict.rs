@@ -128,13 +128,12 @@ impl Measurement {
         if self.in_doubt() {
             return false;
         }
-        let most_px = self.blur_px(MOST_BLUR).max(self.pose.least_blur_px());
-        self.pose.blur_px() < most_px
+        self.pose.blur_px() < self.blur_px(MOST_BLUR)
     }
 
     /// Whether the edges are so sharp that a registration that went astray does not count against them.
     pub(super) fn sharp(&self) -> bool {
-        self.pose.sharpness_px() < self.blur_px(LEAST_BLUR).max(self.pose.least_blur_px())
+        self.pose.sharpness_px() < self.blur_px(LEAST_BLUR)
     }
 
     fn blur_px(&self, (share, px): (f32, f32)) -> f32 {
