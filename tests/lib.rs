@@ -58,8 +58,7 @@ pub fn measure(loaded: &Loaded, capacity: Capacity) -> (Vec<Reading>, Summary) {
     let (readings, _) = measure_events(&loaded.events, &[], settings, capacity);
     let first_us = loaded.events.first().map_or(0, |event| event.t_us);
     let last_us = loaded.events.last().map_or(0, |event| event.t_us);
-    let middle_us = first_us + last_us.saturating_sub(first_us) / 2;
-    let summary = summarise(&readings, middle_us, settings.clock_sigma_ppm);
+    let summary = summarise(&readings, &(first_us..last_us), settings.clock_sigma_ppm);
     (readings, summary)
 }
 

@@ -6,6 +6,7 @@ pub mod decode;
 pub mod event;
 pub mod limits;
 pub mod math;
+mod order;
 pub mod reading;
 pub mod registration;
 pub mod rotors;
@@ -15,7 +16,7 @@ pub mod store;
 pub mod tachometer;
 pub mod tracker;
 
-pub use event::{Event, Geometry, GyroSample, Polarity};
+pub use event::{Event, Geometry, GyroSample, PackedEvent, Polarity};
 pub use reading::{Direction, Evidence, Frame, Reading, Reason, RotorReading, Speed, Status};
 pub use settings::{Ignored, Memory, Poll, Roi, Settings};
 pub use store::StoredEvent;

@@ -21,8 +21,7 @@ impl Roi {
     /// Whether the pixel lies inside.
     #[must_use]
     pub const fn contains(self, x: u16, y: u16) -> bool {
-        // A pixel left of the edge wraps to a large number.
-        x.wrapping_sub(self.x) < self.width_px && y.wrapping_sub(self.y) < self.height_px
+        x >= self.x && y >= self.y && x - self.x < self.width_px && y - self.y < self.height_px
     }
 }
 

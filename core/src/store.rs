@@ -9,13 +9,13 @@
 
 mod event;
 mod lengthen;
+mod open;
 mod window;
 
 pub use event::StoredEvent;
 pub use window::{Account, Window};
 
-use crate::event::Event;
-use event::MOST_WEIGHT_LOG2;
+use open::Segment;
 
 /// Segments in a window.
 pub const WINDOW_SEGMENTS: usize = 6;
@@ -23,40 +23,6 @@ pub const WINDOW_SEGMENTS: usize = 6;
 pub const SPARE_SEGMENTS: usize = 2;
 /// Segments in the ring.
 pub const SEGMENTS: usize = WINDOW_SEGMENTS + SPARE_SEGMENTS;
-
-/// Sixteenths of a segment that keep consecutive events.
-const DENSE_SIXTEENTHS: usize = 3;
-/// Sixteenths before the reservoir starts.
-const BURST_SIXTEENTHS: usize = 7;
-
-#[derive(Clone, Copy, Debug)]
-struct Segment {
-    len: usize,
-    counted: u64,
-    lost: u64,
-    roll_sum_rad_s: f32,
-    roll_count: u32,
-    /// The reservoir keeps every 2^stride_log2-th event.
-    stride_log2: u8,
-    /// Events to pass over before the next is kept.
-    skip: u32,
-}
-
-impl Default for Segment {
-    fn default() -> Self {
-        // Where the octaves end, the reservoir goes on as densely as the last of them.
-        let stride_log2 = (BURST_SIXTEENTHS - DENSE_SIXTEENTHS) as u8;
-        Self {
-            len: 0,
-            counted: 0,
-            lost: 0,
-            roll_sum_rad_s: 0.0,
-            roll_count: 0,
-            stride_log2,
-            skip: 0,
-        }
-    }
-}
 
 /// Events of the recent past, in time order.
 #[derive(Debug)]
@@ -134,51 +100,10 @@ impl<'m> Store<'m> {
         (self.first + index) % SEGMENTS
     }
 
-    /// Takes in one event of the open segment. Cost: about 30 instructions, constant on average.
-    pub fn push(&mut self, event: &Event) {
-        let slot = self.slot(self.closed);
-        let segment = &mut self.segments[slot];
-        segment.counted += 1;
-        if segment.skip > 0 {
-            segment.skip -= 1;
-            self.thinned += 1;
-            return;
-        }
-        let base = slot * self.capacity;
-        let octave = self.capacity / 16;
-        let burst = BURST_SIXTEENTHS * octave;
-        if segment.len == self.capacity {
-            // Halve the reservoir: every other event goes, those kept stay evenly spread.
-            let reservoir = &mut self.events[base + burst..base + self.capacity];
-            let kept = reservoir.len() / 2;
-            self.thinned += (segment.len - burst - kept) as u64;
-            segment.len = burst + kept;
-            segment.stride_log2 = (segment.stride_log2 + 1).min(MOST_WEIGHT_LOG2);
-            for i in 0..kept {
-                reservoir[i] = reservoir[2 * i].weighing(segment.stride_log2);
-            }
-        }
-        let stride_log2 = match segment.len.checked_div(octave).unwrap_or(0) {
-            0..DENSE_SIXTEENTHS => 0,
-            part if part < BURST_SIXTEENTHS => (part - DENSE_SIXTEENTHS + 1) as u8,
-            _ => segment.stride_log2,
-        };
-        if let Some(place) = self.events.get_mut(base + segment.len) {
-            *place = StoredEvent::pack(event, stride_log2);
-            segment.len += 1;
-        }
-        segment.skip = (1_u32 << stride_log2) - 1;
-    }
-
     /// Counts events lost before they reached the store.
     pub fn lost(&mut self, count: u64) {
         let slot = self.slot(self.closed);
         self.segments[slot].lost = self.segments[slot].lost.saturating_add(count);
-    }
-
-    /// Events of a segment that come before its reservoir.
-    const fn burst(&self) -> usize {
-        BURST_SIXTEENTHS * (self.capacity / 16)
     }
 
     /// Takes in the camera's roll rate, positive = the scene turns clockwise on the screen.

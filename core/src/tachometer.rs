@@ -6,6 +6,7 @@
 //! segments: then events are left out and counted until it ends, and the next window starts afresh.
 
 mod conclude;
+mod gate;
 mod intake;
 mod job;
 

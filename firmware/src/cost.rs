@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use evtach_core::{Event, Poll, Tachometer};
+use evtach_core::{PackedEvent, Poll, Tachometer};
 use heapless::LinearMap;
 
 /// A counter of time or of instructions.
@@ -69,11 +69,11 @@ impl<C: Clock> Costs<C> {
         Self { clock, stages: LinearMap::new(), pushed: 0, push: none, spent }
     }
 
-    /// Pushes events. Not inlined, so that there is one of it however many tasks measure.
+    /// Pushes events, the first of them of the time `first_us` in microseconds. Not inlined, so that there is one of it however many tasks measure.
     #[inline(never)]
-    pub fn push(&mut self, tachometer: &mut Tachometer<'_>, events: &[Event]) {
+    pub fn push(&mut self, tachometer: &mut Tachometer<'_>, first_us: u64, events: &[PackedEvent]) {
         let start = self.clock.ticks();
-        tachometer.push(events);
+        tachometer.push_packed(first_us, events);
         let ticks = self.clock.ticks() - start;
         self.push.add(ticks);
         self.pushed += events.len() as u64;

@@ -5,10 +5,10 @@ use core::mem;
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_sync::zerocopy_channel::Sender;
 use embassy_time::{Duration, Instant, Timer};
-use evtach_core::Geometry;
+use evtach_core::{Geometry, GyroSample, PackedEvent};
 use heapless::Vec;
 
-use crate::record::{Decoder, Header, HeaderError, RECORD_BYTES, Record};
+use crate::record::{Decoder, Header, HeaderError, RECORD_BYTES};
 
 /// Events in one block: 128 x 8 B = 1 KiB; at 1 Mev/s a block fills in 128 us.
 pub const BLOCK_EVENTS: usize = 128;
@@ -17,12 +17,17 @@ pub const BLOCK_EVENTS: usize = 128;
 /// of the measurement may take: 0.9 million instructions at 216 MHz.
 pub const BLOCKS: usize = 32;
 
-/// Events on their way from intake to measurement, still as records: half the memory of events.
+/// Gyro samples in one block. Sensors take about a thousand a second, and a block is sent when it holds so many.
+pub const BLOCK_GYRO: usize = 2;
+
+/// Events on their way from intake to measurement.
 #[derive(Clone, Debug)]
 pub struct Block {
-    /// Records in the order in which they came.
-    pub records: Vec<Record, BLOCK_EVENTS>,
-    /// Time of the first in microseconds: a record alone tells only its low 32 bits.
+    places: [PackedEvent; BLOCK_EVENTS],
+    filled: usize,
+    /// Samples of the sensor's gyro that came between these.
+    pub gyro: Vec<GyroSample, BLOCK_GYRO>,
+    /// Time of the first event in microseconds: packed ones tell only its low 32 bits.
     pub t_us: u64,
     /// Size of the sensor that they come from.
     pub geometry: Geometry,
@@ -35,13 +40,56 @@ pub struct Block {
 impl Block {
     /// A block without events.
     pub const EMPTY: Self = Self {
-        records: Vec::new(),
+        places: [PackedEvent::ZERO; BLOCK_EVENTS],
+        filled: 0,
+        gyro: Vec::new(),
         t_us: 0,
         // All zeros, so that the blocks need no image in flash.
         geometry: Geometry { width_px: 0, height_px: 0 },
         lost: 0,
         last: false,
     };
+
+    /// The events, in the order in which they came.
+    #[must_use]
+    pub fn events(&self) -> &[PackedEvent] {
+        self.places.get(..self.filled).unwrap_or_default()
+    }
+
+    /// Forgets the events, and what the gyro said.
+    pub fn clear(&mut self) {
+        self.filled = 0;
+        self.gyro.clear();
+    }
+
+    /// Whether there is nothing in it.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.filled == 0 && self.gyro.is_empty()
+    }
+
+    /// Where further events go: see [`Block::filled`].
+    pub fn space(&mut self) -> &mut [PackedEvent] {
+        self.places.get_mut(self.filled..).unwrap_or_default()
+    }
+
+    /// So many places of the space have been filled.
+    pub fn filled(&mut self, count: usize) {
+        self.filled = (self.filled + count).min(BLOCK_EVENTS);
+    }
+
+    /// Keeps the events from the place `from` on for which `kept` holds, and returns how many went.
+    pub fn retain(&mut self, from: usize, mut kept: impl FnMut() -> bool) -> usize {
+        let before = self.filled;
+        self.filled = from.min(before);
+        for index in self.filled..before {
+            if kept() {
+                self.places[self.filled] = self.places[index];
+                self.filled += 1;
+            }
+        }
+        before - self.filled
+    }
 }
 
 /// How fast a recording plays.
@@ -136,17 +184,15 @@ pub async fn take_in<S: Source, M: RawMutex>(
 ) -> Result<(), IntakeError<S::Error>> {
     let start = Instant::now();
     let mut decoder = Decoder::new(header.first_us);
-    let mut records = Vec::<Record, BLOCK_EVENTS>::new();
+    let mut bytes = [[0; RECORD_BYTES]; BLOCK_EVENTS];
     let mut lost = 0;
     let mut taken = 0;
     while taken < header.events {
         let wanted = (header.events - taken).min(BLOCK_EVENTS as u32);
-        records.clear();
-        records.resize(wanted as usize, [0; RECORD_BYTES]).ok();
-        let bytes = records.as_flattened_mut();
-        let read = source.read(bytes).await.map_err(IntakeError::Source)?;
+        let records = &mut bytes[..wanted as usize];
+        let read = source.read(records.as_flattened_mut()).await.map_err(IntakeError::Source)?;
         taken += (read / RECORD_BYTES) as u32;
-        if read < bytes.len() {
+        if read < records.len() * RECORD_BYTES {
             return Err(IntakeError::Truncated { events: taken, expected: header.events });
         }
         let first_us = records.first().map_or(0, |record| decoder.decode(*record).t_us);
@@ -157,7 +203,11 @@ pub async fn take_in<S: Source, M: RawMutex>(
         }
         let slot = if pace.can_wait() { Some(blocks.send().await) } else { blocks.try_send() };
         if let Some(slot) = slot {
-            mem::swap(&mut slot.records, &mut records);
+            slot.clear();
+            for (place, record) in slot.space().iter_mut().zip(&*records) {
+                *place = PackedEvent::from_bytes(*record);
+            }
+            slot.filled(records.len());
             slot.t_us = first_us;
             slot.geometry = header.geometry;
             slot.lost = mem::take(&mut lost);
@@ -168,7 +218,7 @@ pub async fn take_in<S: Source, M: RawMutex>(
         }
     }
     let slot = blocks.send().await;
-    slot.records.clear();
+    slot.clear();
     slot.lost = lost;
     slot.last = true;
     blocks.send_done();

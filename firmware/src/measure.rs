@@ -1,20 +1,18 @@
-//! Measuring: blocks of records in, readings out, in steps short enough that intake need not wait.
+//! Measuring: blocks of events in, readings out, in steps short enough that intake need not wait.
 
 use embassy_futures::yield_now;
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_sync::zerocopy_channel::Receiver;
 use embassy_time::{Duration, with_timeout};
-use evtach_core::{Event, Poll, Reading, Settings, Tachometer};
-use heapless::Vec;
+use evtach_core::{Poll, Reading, Settings, Tachometer};
 
 use crate::cost::{Clock, Costs, Spent};
-use crate::intake::{BLOCK_EVENTS, Block, Pace};
-use crate::record::Decoder;
+use crate::intake::{Block, Pace};
 
 /// Steps of a measurement between two looks at what has arrived.
 pub const STEPS: u32 = 1;
 
-/// Where blocks are turned into events and pushed.
+/// Where blocks go.
 struct Intake<'t, 'm, C> {
     tachometer: &'t mut Tachometer<'m>,
     costs: &'t mut Costs<C>,
@@ -24,16 +22,16 @@ struct Intake<'t, 'm, C> {
 impl<C: Clock> Intake<'_, '_, C> {
     fn push(&mut self, block: &Block) {
         let settings = *self.tachometer.settings();
-        if settings.geometry != block.geometry && !block.records.is_empty() {
+        if settings.geometry != block.geometry && !block.events().is_empty() {
             self.tachometer.configure(Settings { geometry: block.geometry, ..settings });
         }
         if block.lost > 0 {
             self.tachometer.lost(block.lost);
         }
-        let mut decoder = Decoder::new(block.t_us);
-        let events: Vec<Event, BLOCK_EVENTS> =
-            block.records.iter().map(|&record| decoder.decode(record)).collect();
-        self.costs.push(self.tachometer, &events);
+        self.costs.push(self.tachometer, block.t_us, block.events());
+        for sample in &block.gyro {
+            self.tachometer.gyro(*sample);
+        }
         self.ended |= block.last;
     }
 }

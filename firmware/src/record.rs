@@ -18,7 +18,7 @@
 //! | 4 | column in pixels, u16 |
 //! | 6 | row in pixels in bits 0 to 14; bit 15: the pixel became brighter |
 
-use evtach_core::{Event, Geometry, Polarity};
+use evtach_core::{Event, Geometry, PackedEvent};
 
 /// Bytes of one record.
 pub const RECORD_BYTES: usize = 8;
@@ -27,7 +27,6 @@ pub const RECORD_BYTES: usize = 8;
 pub type Record = [u8; RECORD_BYTES];
 
 const MAGIC: [u8; 8] = *b"evtach8\n";
-const BRIGHTER: u16 = 0x8000;
 
 /// Why a recording for the device cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -100,11 +99,7 @@ impl Header {
 /// The record of an event.
 #[must_use]
 pub fn encode(event: &Event) -> Record {
-    let [t0, t1, t2, t3, ..] = event.t_us.to_le_bytes();
-    let [x0, x1] = event.x.to_le_bytes();
-    let brighter = if event.polarity == Polarity::On { BRIGHTER } else { 0 };
-    let [y0, y1] = (event.y & !BRIGHTER | brighter).to_le_bytes();
-    [t0, t1, t2, t3, x0, x1, y0, y1]
+    PackedEvent::pack(event).to_bytes()
 }
 
 /// Turns records back into events.
@@ -122,22 +117,16 @@ impl Decoder {
 
     /// The event of a record. Records may lie up to 35 minutes before or after their predecessor.
     pub fn decode(&mut self, record: Record) -> Event {
-        let [t0, t1, t2, t3, x0, x1, y0, y1] = record;
-        let low = u32::from_le_bytes([t0, t1, t2, t3]);
-        let step = low.wrapping_sub(self.latest_us as u32) as i32;
-        self.latest_us = self.latest_us.saturating_add_signed(i64::from(step));
-        let y_polarity = u16::from_le_bytes([y0, y1]);
-        Event {
-            t_us: self.latest_us,
-            x: u16::from_le_bytes([x0, x1]),
-            y: y_polarity & !BRIGHTER,
-            polarity: if y_polarity & BRIGHTER == 0 { Polarity::Off } else { Polarity::On },
-        }
+        let event = PackedEvent::from_bytes(record).unpack(self.latest_us);
+        self.latest_us = event.t_us;
+        event
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use evtach_core::Polarity;
+
     use super::*;
 
     const GEOMETRY: Geometry = Geometry { width_px: 346, height_px: 260 };

@@ -1,12 +1,14 @@
 //! Recording events into memory outside of the processor's own: record on the device, replay on the PC.
 //!
-//! What is kept is the file of [`crate::record`]: its header is made when it is read, its records lie in the memory as
-//! they came.
+//! What is kept is the file of [`crate::record`]: its header is made when it is read, its records lie in the memory.
 
 use embedded_storage::Storage;
-use evtach_core::Geometry;
+use evtach_core::{Geometry, PackedEvent};
 
-use crate::record::{Header, RECORD_BYTES, Record};
+use crate::record::{Header, RECORD_BYTES};
+
+/// Records that are written at once.
+const AT_ONCE: usize = 16;
 
 /// Why a recording stopped or cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -75,25 +77,32 @@ impl<M: Storage> Recorder<M> {
         self.running = false;
     }
 
-    /// Keeps records while it runs; `first_us` is the time of the first of them in microseconds.
+    /// Keeps events while it runs; `first_us` is the time of the first of them in microseconds.
     ///
     /// # Errors
     /// When the memory fails, which ends the recording; what was kept before stays.
-    pub fn push(&mut self, first_us: u64, records: &[Record]) -> Result<(), MemoryError> {
+    pub fn push(&mut self, first_us: u64, events: &[PackedEvent]) -> Result<(), MemoryError> {
         let room = (self.wanted - self.events) as usize;
-        let records = &records[..records.len().min(room)];
-        if !self.running || records.is_empty() {
+        let events = &events[..events.len().min(room)];
+        if !self.running || events.is_empty() {
             return Ok(());
         }
         if self.events == 0 {
             self.first_us = first_us;
         }
-        let offset = self.events * RECORD_BYTES as u32;
-        if self.memory.write(offset, records.as_flattened()).is_err() {
-            self.running = false;
-            return Err(MemoryError { offset });
+        for events in events.chunks(AT_ONCE) {
+            let mut bytes = [[0; RECORD_BYTES]; AT_ONCE];
+            for (record, event) in bytes.iter_mut().zip(events) {
+                *record = event.to_bytes();
+            }
+            let offset = self.events * RECORD_BYTES as u32;
+            let bytes = &bytes.as_flattened()[..events.len() * RECORD_BYTES];
+            if self.memory.write(offset, bytes).is_err() {
+                self.running = false;
+                return Err(MemoryError { offset });
+            }
+            self.events += events.len() as u32;
         }
-        self.events += records.len() as u32;
         self.running = self.events < self.wanted;
         Ok(())
     }
@@ -173,8 +182,8 @@ mod tests {
             .collect()
     }
 
-    fn records(events: &[Event]) -> Vec<Record> {
-        events.iter().map(record::encode).collect()
+    fn packed(events: &[Event]) -> Vec<PackedEvent> {
+        events.iter().map(PackedEvent::pack).collect()
     }
 
     fn recorder() -> Recorder<Ram> {
@@ -185,13 +194,13 @@ mod tests {
     fn the_file_holds_what_came_in_any_piecing() {
         let mut recorder = recorder();
         assert_eq!((recorder.capacity(), recorder.length()), (5, 0));
-        recorder.push(1, &records(&events(1))).expect("not running");
+        recorder.push(1, &packed(&events(1))).expect("not running");
         assert_eq!(recorder.events(), 0);
         recorder.start(GEOMETRY, 4);
         let events = events(6);
-        recorder.push(events[0].t_us, &records(&events[..3])).expect("room");
+        recorder.push(events[0].t_us, &packed(&events[..3])).expect("room");
         assert!(recorder.is_running() && !recorder.is_full());
-        recorder.push(events[3].t_us, &records(&events[3..])).expect("room");
+        recorder.push(events[3].t_us, &packed(&events[3..])).expect("room");
         assert!(!recorder.is_running() && recorder.is_full());
         assert_eq!((recorder.events(), recorder.length()), (4, 24 + 32));
         let mut file = [0; 56];
@@ -219,12 +228,12 @@ mod tests {
     fn no_more_than_there_is_room_for() {
         let mut recorder = recorder();
         recorder.start(GEOMETRY, u32::MAX);
-        recorder.push(0, &records(&events(9))).expect("room for some");
+        recorder.push(0, &packed(&events(9))).expect("room for some");
         assert_eq!((recorder.events(), recorder.is_full()), (5, true));
         recorder.start(GEOMETRY, 2);
         assert_eq!((recorder.events(), recorder.is_running()), (0, true));
         recorder.stop();
-        recorder.push(0, &records(&events(1))).expect("stopped");
+        recorder.push(0, &packed(&events(1))).expect("stopped");
         assert_eq!(recorder.events(), 0);
     }
 
@@ -232,9 +241,9 @@ mod tests {
     fn a_memory_that_fails_ends_the_recording() {
         let mut recorder = recorder();
         recorder.start(GEOMETRY, 5);
-        recorder.push(0, &records(&events(1))).expect("room");
+        recorder.push(0, &packed(&events(1))).expect("room");
         recorder.memory.broken = true;
-        let error = recorder.push(0, &records(&events(1)));
+        let error = recorder.push(0, &packed(&events(1)));
         assert_eq!(error, Err(MemoryError { offset: 8 }));
         assert_eq!((recorder.events(), recorder.is_running()), (1, false));
         assert_eq!(recorder.read(20, &mut [0; 8]), Err(MemoryError { offset: 0 }));

@@ -49,8 +49,8 @@ fn recordings() -> Vec<Vec<Event>> {
 fn measure_in(events: &[Event], width_px: u16, height_px: u16) -> (RotorReading, Speed) {
     let settings = Settings::new(Geometry::new(width_px, height_px).expect("a sensor in range"));
     let (readings, _) = measure_events(events, &[], settings, Capacity::Full);
-    let middle_us = events[0].t_us + (events[events.len() - 1].t_us - events[0].t_us) / 2;
-    let summary = summarise(&readings, middle_us, settings.clock_sigma_ppm);
+    let span_us = events[0].t_us..events[events.len() - 1].t_us;
+    let summary = summarise(&readings, &span_us, settings.clock_sigma_ppm);
     let [rotor] = &summary.rotors[..] else { unreachable!("one rotor was expected: {summary:#?}") };
     (rotor.clone(), rotor.speed.expect("a speed"))
 }

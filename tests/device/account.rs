@@ -148,12 +148,12 @@ async fn measure(mut blocks: Receiver<'_, NoopRawMutex, Block>) -> Measured {
         let block = blocks.receive().await;
         let mut decoder = Decoder::new(block.t_us);
         let events: Vec<Event> =
-            block.records.iter().map(|&record| decoder.decode(record)).collect();
+            block.events().iter().map(|event| decoder.decode(event.to_bytes())).collect();
         measured.pushed += events.len() as u64;
         measured.off_sensor += events.iter().filter(|event| event.x >= 320).count() as u64;
         measured.told_lost += block.lost;
         tachometer.lost(block.lost);
-        tachometer.push(&events);
+        tachometer.push_packed(block.t_us, block.events());
         let last = block.last;
         blocks.receive_done();
         if last {

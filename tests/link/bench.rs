@@ -1,12 +1,12 @@
 //! A device on the bench: everything the link sees, held in plain fields that a test may set.
 
-use evtach_core::{Event, Geometry, Reading, Reason};
+use evtach_core::{Event, Geometry, PackedEvent, Reading, Reason};
 use evtach_firmware::instrument::{Fault, Preferences, Sensor};
-use evtach_firmware::record;
 use evtach_firmware::recorder::Recorder;
 use evtach_firmware::scpi::{
     Device, Identity, Link, RecorderFailed, RecorderStatus, Statistics, View,
 };
+use evtach_firmware::sensor::usb::Trouble;
 
 /// Memory for recordings that fails when told to.
 pub struct Ram {
@@ -37,6 +37,7 @@ impl embedded_storage::Storage for Ram {
 /// The device.
 pub struct Bench {
     pub sensor: Sensor,
+    pub trouble: Option<Trouble>,
     pub geometry: Option<Geometry>,
     pub reading: Option<Reading>,
     pub reason: Reason,
@@ -60,6 +61,7 @@ impl Bench {
         let ram = Ram { bytes: vec![0; memory_bytes], broken: false };
         Self {
             sensor: Sensor::Present,
+            trouble: None,
             geometry: Geometry::new(320, 240),
             reading: None,
             reason: Reason::Searching,
@@ -85,9 +87,9 @@ impl Bench {
 
     /// Events from the sensor, to the recorder.
     pub fn record(&mut self, events: &[Event]) {
-        let records: Vec<record::Record> = events.iter().map(record::encode).collect();
+        let packed: Vec<PackedEvent> = events.iter().map(PackedEvent::pack).collect();
         if let (Some(recorder), Some(first)) = (&mut self.recorder, events.first()) {
-            recorder.push(first.t_us, &records).ok();
+            recorder.push(first.t_us, &packed).ok();
         }
     }
 }
@@ -99,6 +101,10 @@ impl Device for Bench {
 
     fn sensor(&self) -> Sensor {
         self.sensor
+    }
+
+    fn trouble(&self) -> Option<Trouble> {
+        self.trouble
     }
 
     fn reading(&self) -> Option<&Reading> {

@@ -81,14 +81,15 @@ pub enum Progress {
 }
 
 impl Run {
+    /// All zeros, so that the flash holds no copy of them and of the memory around.
     const EMPTY: Self = Self {
         radius_px: 0.0,
         residual: Residual::FixedAxis,
         settled: 0.0,
         there: None,
-        rigid: Rigid::IDENTITY,
+        rigid: Rigid::UNSET,
         yaw_rad: 0.0,
-        limit_px: f32::MAX,
+        limit_px: 0.0,
         iterations: 0,
     };
 }

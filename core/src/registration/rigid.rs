@@ -12,9 +12,9 @@ pub struct Rigid {
 }
 
 impl Rigid {
-    /// No turn, no shift.
-    pub const IDENTITY: Self =
-        Self { rotation: Matrix2::new(1.0, 0.0, 0.0, 1.0), shift_px: Vector2::new(0.0, 0.0) };
+    /// None yet: all zeros, which moves every point to the centre.
+    pub(super) const UNSET: Self =
+        Self { rotation: Matrix2::new(0.0, 0.0, 0.0, 0.0), shift_px: Vector2::new(0.0, 0.0) };
 
     /// The rotation by `yaw_rad`, positive = clockwise on the screen.
     #[must_use]

@@ -29,6 +29,7 @@ use crate::limits::{
     COHERENCE_CELLS, MAX_CANDIDATES, MAX_CLUSTERS, MAX_LINES, MAX_ROTORS, VISIT_CELLS, VISITS,
 };
 use crate::math::{TAU, sqrt};
+use crate::order::sort_few;
 use crate::speed::polar::{PolarTrack, track};
 use crate::store::{StoredEvent, Window};
 
@@ -270,7 +271,7 @@ impl Extraction {
         }
         // A piece of a rotor, or a rotor by the line of its neighbour, explains fewer events than the rotor by
         // its own line.
-        self.candidates.sort_unstable_by(|a, b| b.explained.total_cmp(&a.explained));
+        sort_few(&mut self.candidates, |a, b| a.explained.total_cmp(&b.explained).is_gt());
         self.stage = Stage::Done;
     }
 

@@ -62,7 +62,7 @@ fn paces(window: &Window<'_>, segment: usize) -> (f32, u32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::event::{Event, Polarity};
+    use crate::event::{PackedEvent, Polarity};
     use crate::store::{SEGMENTS, Store};
 
     /// The stretch of a window of events whose distances are told in nanoseconds.
@@ -79,7 +79,7 @@ mod tests {
             while t_us >= store.open_end_us() {
                 store.close_segment();
             }
-            store.push(&Event { t_us, x: 1, y: 1, polarity: Polarity::On });
+            store.push(&[PackedEvent::new(t_us as u32, 1, 1, Polarity::On)]);
         }
         stretch(&store.window(6, u64::MAX))
     }

@@ -1,6 +1,6 @@
 //! One stored event.
 
-use crate::event::{Event, Polarity};
+use crate::event::PackedEvent;
 
 /// One event as the store keeps it, 8 bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -20,18 +20,18 @@ const WEIGHT_MASK: u16 = 0xF << ROW_BITS;
 pub(super) const MOST_WEIGHT_LOG2: u8 = 15;
 
 impl StoredEvent {
-    pub(super) fn pack(event: &Event, weight_log2: u8) -> Self {
-        let polarity = if event.polarity == Polarity::On { POLARITY_BIT } else { 0 };
-        let packed = Self {
-            t_us: event.t_us as u32,
-            x: event.x,
-            y_weight_polarity: (event.y & ROW_MASK) | polarity,
-        };
-        packed.weighing(weight_log2)
+    #[inline]
+    pub(super) const fn store(event: PackedEvent, weight_log2: u8) -> Self {
+        let pixel = event.pixel_and_polarity();
+        let stored =
+            Self { t_us: event.low_us(), x: pixel as u16, y_weight_polarity: (pixel >> 16) as u16 };
+        stored.weighing(weight_log2)
     }
 
-    pub(super) fn weighing(self, weight_log2: u8) -> Self {
-        let weight = u16::from(weight_log2.min(MOST_WEIGHT_LOG2)) << ROW_BITS;
+    #[inline]
+    pub(super) const fn weighing(self, weight_log2: u8) -> Self {
+        let most = if weight_log2 < MOST_WEIGHT_LOG2 { weight_log2 } else { MOST_WEIGHT_LOG2 };
+        let weight = (most as u16) << ROW_BITS;
         Self { y_weight_polarity: (self.y_weight_polarity & !WEIGHT_MASK) | weight, ..self }
     }
 

@@ -1,5 +1,5 @@
 use super::*;
-use crate::event::Polarity;
+use crate::event::{Event, PackedEvent, Polarity};
 
 fn event(t_us: u64) -> Event {
     Event { t_us, x: (t_us % 300) as u16, y: 7, polarity: Polarity::On }
@@ -10,7 +10,7 @@ fn fill(store: &mut Store<'_>, times: impl Iterator<Item = u64>) {
         while t_us >= store.open_end_us() {
             store.close_segment();
         }
-        store.push(&event(t_us));
+        store.push(&[PackedEvent::pack(&event(t_us))]);
     }
 }
 

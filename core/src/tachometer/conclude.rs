@@ -4,6 +4,7 @@ use heapless::Vec;
 
 use super::{BASE_WINDOW_US, Job, LONGEST_WINDOW_US, Tachometer, segment_us};
 use crate::limits::MAX_ROTORS;
+use crate::order::sort_few;
 use crate::reading::{Evidence, Frame, Reading, Reason, RotorReading, Status};
 use crate::rotors::Disc;
 use crate::speed::measurement::Outcome;
@@ -47,7 +48,7 @@ impl Tachometer<'_> {
             let id = self.tracker.identify(outcome);
             rotors.push(rotor_reading(id, outcome, account.roll_rad_s())).ok();
         }
-        rotors.sort_unstable_by_key(|rotor| rotor.id);
+        sort_few(&mut rotors, |a, b| a.id < b.id);
         let lost =
             account.lost as f32 > MOST_LOST * account.counted.saturating_add(account.lost) as f32;
         let status = if account.counted == 0 {

@@ -2,7 +2,6 @@ extern crate std;
 
 use std::vec::Vec as Heap;
 
-use embassy_futures::block_on;
 use embassy_futures::join::join;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::zerocopy_channel::{Channel, Receiver};
@@ -10,6 +9,7 @@ use evtach_core::{Event, Geometry, Polarity};
 
 use super::*;
 use crate::record;
+use crate::test_time::block_on;
 
 /// Bytes in memory.
 struct Bytes<'b>(&'b [u8]);
@@ -63,7 +63,7 @@ async fn all(mut blocks: Receiver<'_, NoopRawMutex, Block>) -> (Heap<Event>, Hea
     let (mut events, mut lost) = (Heap::new(), Heap::new());
     loop {
         let block = blocks.receive().await;
-        events.extend(block.records.iter().map(|&record| decoder.decode(record)));
+        events.extend(block.events().iter().map(|event| decoder.decode(event.to_bytes())));
         lost.push(block.lost);
         let last = block.last;
         blocks.receive_done();
@@ -105,7 +105,7 @@ fn a_cut_recording_says_after_how_many_events() {
     let expected = events.len() as u32;
     // Nobody marks a last block: what was sent before the end is taken without waiting.
     let (end, received) = play(&bytes[..cut], Pace::File, async |mut blocks| {
-        let block = blocks.receive().await.records.len();
+        let block = blocks.receive().await.events().len();
         blocks.receive_done();
         block
     });

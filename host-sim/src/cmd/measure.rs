@@ -151,8 +151,7 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
         eprintln!("{name}: {} events stepped back in time and were left out", ignored.out_of_order);
     }
     facts.lost = recording.lost();
-    let middle_us = facts.first_us + facts.last_us.saturating_sub(facts.first_us) / 2;
-    let summary = summarise(&readings, middle_us, args.how.clock_ppm);
+    let summary = summarise(&readings, &(facts.first_us..facts.last_us), args.how.clock_ppm);
     if args.json {
         println!("{}", serde_json::to_string(&Document::new(&facts, &summary, &readings))?);
     } else {

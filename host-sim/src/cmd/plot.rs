@@ -56,8 +56,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (first_us, last_us) = (first.t_us, last.t_us);
     let settings = args.how.settings(recording.geometry);
     let (readings, _) = measure_events(&events, &gyro, settings, args.how.capacity);
-    let summary =
-        summarise(&readings, first_us + last_us.saturating_sub(first_us) / 2, args.how.clock_ppm);
+    let summary = summarise(&readings, &(first_us..last_us), args.how.clock_ppm);
     let facts = FileFacts {
         file: name,
         format: recording.format.to_owned(),

@@ -1,7 +1,8 @@
 //! The frame: header, payload, checksum. The layout stands in `firmware/docs/spi.md`.
 
-use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use evtach_core::Geometry;
+
+use super::checksum::checksum_of;
 
 /// First bytes of a frame. Read as words they are of types that neither EVT 2 nor EVT 3 defines, so
 /// they cannot stand in a payload where a word begins.
@@ -21,9 +22,6 @@ pub const OVERHEAD_BYTES: usize = HEADER_BYTES + CHECKSUM_BYTES;
 
 /// Longest frame in bytes.
 pub const MAX_FRAME_BYTES: usize = MAX_PAYLOAD_BYTES + OVERHEAD_BYTES;
-
-/// One byte at a time, from a table of 1 KiB; a table of 16 KiB would be faster, and too large for the flash.
-const CHECKSUM: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
 /// What a frame carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -125,7 +123,7 @@ fn array<const N: usize>(bytes: &[u8; HEADER_BYTES], at: usize) -> [u8; N] {
 
 /// The checksum of a frame: over all of it but the magic, which is always the same, and itself.
 pub(super) fn checksum(header_and_payload: &[u8]) -> [u8; CHECKSUM_BYTES] {
-    CHECKSUM.checksum(header_and_payload.get(MAGIC.len()..).unwrap_or_default()).to_le_bytes()
+    checksum_of(header_and_payload.get(MAGIC.len()..).unwrap_or_default()).to_le_bytes()
 }
 
 /// What the sensor is: sent first, and again at least every 100 ms.

@@ -6,6 +6,7 @@
 mod account;
 mod acquire;
 mod bridge;
+mod checksum;
 mod driver;
 mod flash;
 mod frame;

@@ -22,8 +22,8 @@ pub struct Args {
 
 /// What the device is to stay within.
 const ASKED_INSTRUCTIONS_PER_S: u64 = 150_000_000;
-const ASKED_RAM_BYTES: u64 = 320 * 1024;
-const ASKED_FLASH_BYTES: u64 = 256 * 1024;
+pub(super) const ASKED_RAM_BYTES: u64 = 320 * 1024;
+pub(super) const ASKED_FLASH_BYTES: u64 = 256 * 1024;
 
 /// Past these the command fails. Flash is above what is asked: it is where things stand, so that they do not get worse.
 /// Instructions have no such limit: at a million events a second the processor is full, and can do no more.
