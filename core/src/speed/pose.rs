@@ -45,8 +45,6 @@ const FOLDED_PERIODS: usize = 3;
 const MOST_HARMONIC: u32 = 96;
 /// A doubled harmonic must keep this share of the events in step that were so at first.
 const SHARP_COHERENCE: f32 = 0.5;
-/// Share of the events in step that edges as sharp as can be seen leave there.
-const SEEN_COHERENCE: f32 = 0.75;
 /// Blocks over which the wandering of the axis is judged.
 const DRIFT_BLOCKS: usize = 12;
 
@@ -194,17 +192,6 @@ impl Pose {
             self.sharpness_px() * self.first_coherence.max(self.coherence)
         } else {
             self.sharpness_px()
-        }
-    }
-
-    /// Blur in pixels half-way to the rim below which edges could not be seen, where parts differ and the harmonic rose as
-    /// far as it may; 0 where it may rise further.
-    #[must_use]
-    pub fn least_blur_px(&self) -> f32 {
-        if self.has_overtone() && self.harmonic == self.most_harmonic {
-            0.5 * self.disc.radius_px / (SEEN_COHERENCE * self.harmonic as f32)
-        } else {
-            0.0
         }
     }
 
