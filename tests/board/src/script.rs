@@ -243,8 +243,7 @@ impl Script {
             _ => bail!("fault halt, dead, odd, clock"),
         };
         let camera = self.camera.as_ref().ok_or_else(|| anyhow!("there is no camera"))?;
-        // Before any further event.
-        camera.borrow_mut().plan(0, fault);
+        camera.borrow_mut().fail(fault);
         Ok(())
     }
 

@@ -1,7 +1,8 @@
 //! What a camera at the port sees, read by the device: the PC's readings to the bit.
 
 use evtach_core::Event;
-use evtach_firmware::sensor::spi::{Bridge, Kind};
+use evtach_core::decode::Dvxplorer;
+use evtach_firmware::sensor::usb::emulated::DvxplorerWords;
 use evtach_host::measure::{Capacity, ReadingRow};
 use evtach_host::synth::{Rotor, Scene};
 use evtach_tests::{Loaded, load, measure, recordings, show};
@@ -31,36 +32,33 @@ fn first_reading(board: &mut Board, camera: Camera, sees: &Loaded) -> ReadingRow
     serde_json::from_str(line).unwrap_or_else(|error| unreachable!("{said:?}: {error}; {seen}"))
 }
 
+/// The events in the order in which they leave the camera: a DVXplorer sends those of a column and an instant together.
+fn as_sent(camera: Camera, sees: &Loaded) -> Loaded {
+    if camera == Camera::Davis346 {
+        return sees.clone();
+    }
+    let (mut words, mut said, mut events) = (DvxplorerWords::default(), Vec::new(), Vec::new());
+    for event in &sees.events {
+        words.event(event, &mut said);
+    }
+    words.flush(&mut said);
+    let mut decoder = Dvxplorer::new();
+    for word in said {
+        decoder.decode(word, |event| events.push(event));
+    }
+    Loaded { events, geometry: sees.geometry }
+}
+
 /// The device's first reading of these events is that of `evtach measure --capacity device`, to the last digit; both
 /// write an f32 with the fewest digits that give it again.
 fn assert_reads_as_the_pc(camera: Camera, sees: &Loaded, rotors: usize, status: &str) {
     let Some(mut board) = Board::switch_on() else { return };
-    let (readings, _) = measure(sees, Capacity::Device);
+    let (readings, _) = measure(&as_sent(camera, sees), Capacity::Device);
     let first = readings.first().expect("a reading on the PC");
     let device = first_reading(&mut board, camera, sees);
     assert_eq!(device, ReadingRow::new(first, first.t_us));
     assert_eq!((device.rotors.len(), &*device.status), (rotors, status), "{device:?}");
     board.assert_sound();
-}
-
-/// No camera: the button is held while power comes, and a recording in the serial flash is played.
-#[test]
-fn a_recording_in_the_serial_flash_is_replayed() {
-    let Some(mut board) = Board::switch_on() else { return };
-    let sees = one_rotor(1500.0, 3000.0);
-    let mut bridge = Bridge::new(Kind::Evt2, sees.geometry, "a fan");
-    let mut stream = Vec::new();
-    for event in &sees.events {
-        bridge.push(event, |frame| stream.extend_from_slice(frame));
-    }
-    bridge.end(|frame| stream.extend_from_slice(frame));
-    board.flash(1 << 20, &stream);
-    board.hold_button();
-    board.break_("power_cut");
-    let speed = board.wait_for(6.0, "FETC?", |answer| !answer.starts_with("9.91"));
-    let rpm: f64 = speed.parse().expect("a number");
-    assert!((rpm / 1500.0 - 1.0).abs() < 0.01, "{speed}");
-    assert!(board.defmt_log().iter().any(|line| line.contains("serial flash is played")));
 }
 
 #[test]
@@ -78,8 +76,22 @@ fn four_rotors() {
         at(90.0, 190.0, -1460.0),
         at(250.0, 190.0, 1580.0),
     ];
-    let scene = Scene { rotors, duration_ms: 400.0, ..Scene::default() };
-    assert_reads_as_the_pc(Camera::Davis346, &synthesise(&scene), 4, "locked");
+    let sees = synthesise(&Scene { rotors, duration_ms: 400.0, ..Scene::default() });
+    let Some(mut board) = Board::switch_on() else { return };
+    board.run(0.5);
+    board.plug_camera(Camera::Davis346, &sees);
+    // The first search for four takes so long that its reading is too old to be shown as the present; what is remembered
+    // of each rotor tells it all the same.
+    board.wait_for(10.0, "CALC:AVER:COUN?", |answer| answer == "1");
+    let (readings, _) = measure(&sees, Capacity::Device);
+    let pc = ReadingRow::new(readings.first().expect("a reading on the PC"), 0);
+    assert_eq!(pc.rotors.len(), 4);
+    for rotor in &pc.rotors {
+        let device: f64 =
+            board.query(&format!("CONF {};:CALC:AVER:MAX?", rotor.id)).parse().expect("a speed");
+        assert_eq!(Some(device), rotor.rpm, "rotor {}", rotor.id);
+    }
+    board.assert_sound();
 }
 
 #[test]

@@ -61,9 +61,18 @@ impl Doubt {
 }
 
 impl Measurement {
-    /// Whether another harmonic keeps step almost as well wherever the centre is thought to be.
+    /// Whether another harmonic keeps step almost as well wherever the centre is thought to be, and no overtone settles it.
     pub(super) fn in_doubt(&self) -> bool {
-        self.evidence.scan_standing.is_some_and(|standing| standing > IN_DOUBT)
+        self.standing() > IN_DOUBT && !self.pose.has_overtone()
+    }
+
+    /// Whether there is any doubt: too much where no lock tells a harmonic from its neighbour.
+    pub(super) fn doubted(&self) -> bool {
+        self.standing() > DOUBTFUL
+    }
+
+    fn standing(&self) -> f32 {
+        self.evidence.scan_standing.unwrap_or(0.0)
     }
 
     /// Looks about the centre, then begins again with what was found there.

@@ -74,20 +74,25 @@ impl Measurement {
             } else if sharp && long {
                 self.estimate = both;
                 self.status = Status::Locked;
-            } else if long {
-                // Too rough for a lock, and no better than either.
-                let spread = self.estimate.sigma_rad_s;
-                let sigma_rad_s = sqrt(both.sigma_rad_s * both.sigma_rad_s + spread * spread);
-                self.estimate = Estimate { sigma_rad_s, ..both };
             } else if sharp {
                 // Right if the parts are as alike as they look: the window shows too few to be sure.
                 let spread = ALIKE_SIGMA * self.estimate.sigma_rad_s;
+                let sigma_rad_s = sqrt(both.sigma_rad_s * both.sigma_rad_s + spread * spread);
+                self.estimate = Estimate { sigma_rad_s, ..both };
+            } else {
+                // Too rough for a lock, and no better than either.
+                let spread = self.estimate.sigma_rad_s;
                 let sigma_rad_s = sqrt(both.sigma_rad_s * both.sigma_rad_s + spread * spread);
                 self.estimate = Estimate { sigma_rad_s, ..both };
             }
         }
         if phase.is_none() || (lock.is_none() && !self.coarse_stands(phase)) {
             self.status = Status::Refused(Reason::Ambiguous);
+        }
+        if let (None, Some(phase)) = (lock, phase) {
+            let both = combine(self.estimate, phase);
+            let sigma_rad_s = both.sigma_rad_s.max(self.estimate.sigma_rad_s);
+            self.estimate = Estimate { sigma_rad_s, ..both };
         }
         let clock = stated.clock_sigma_ppm * 1e-6 * self.estimate.omega_rad_s;
         let roll = if self.drift_px_s > STILL_PX_S {
@@ -117,7 +122,7 @@ impl Measurement {
     /// Whether the rotor has edges: what merely keeps step with one frequency has none, and a wrong harmonic about a wrong
     /// centre has no overtone.
     pub(super) fn has_edges(&self) -> bool {
-        if self.in_doubt() && !self.pose.has_overtone() {
+        if self.in_doubt() {
             return false;
         }
         let most_px = self.blur_px(MOST_BLUR).max(self.pose.least_blur_px());
@@ -165,7 +170,7 @@ impl Measurement {
                 && phase.sigma_rad_s < COARSE_PHASE_SIGMA * omega.abs()
         });
         let alike = |rate: &f32| (rate - omega).abs() < COARSE_SPREAD * omega.abs();
-        even && (self.rates.iter().all(alike) || self.sharp())
+        even && !self.doubted() && (self.rates.iter().all(alike) || self.sharp())
     }
 }
 

@@ -25,8 +25,6 @@ const FPCA: u32 = 1 << 2;
 const SPSEL: u32 = 1 << 1;
 /// Bit of a stacked xPSR: the stack pointer was moved to a multiple of eight.
 const ALIGNED: u32 = 1 << 9;
-/// Bits of xPSR: an IT block is under way.
-const IT_STATE: u32 = 0x0600_fc00;
 /// The Thumb bit of xPSR.
 const THUMB: u32 = 1 << 24;
 
@@ -51,10 +49,6 @@ pub fn unmasked(engine: &Unicorn<'_, ()>, priority: i16) -> bool {
     if priority < 0 {
         // A fault passes PRIMASK; only its like keeps it off.
         return true;
-    }
-    // The engine cuts an IT block where a page of 1 KB ends, and does not stack how far it was: the next block comes soon.
-    if register(engine, R::XPSR) & IT_STATE != 0 {
-        return false;
     }
     let base = register(engine, R::BASEPRI) & 0xf0;
     register(engine, R::PRIMASK) & 1 == 0
@@ -109,7 +103,9 @@ pub fn enter(
         link |= PROCESS_STACK;
     }
     nvic.enter(exception);
-    set_register(engine, R::IPSR, u32::from(exception));
+    // No IT block reaches into the handler.
+    const IT: u32 = 0x0600_fc00;
+    set_register(engine, R::XPSR_NZCVQG, xpsr & !(IT | 0x1ff) | u32::from(exception));
     set_register(engine, R::CONTROL, control & !(FPCA | if from_thread { SPSEL } else { 0 }));
     set_register(engine, R::LR, link);
     let mut vector = [0; 4];
