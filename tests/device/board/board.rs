@@ -192,7 +192,9 @@ impl Board {
     pub fn wait_for(&mut self, seconds: f64, line: &str, wanted: impl Fn(&str) -> bool) -> String {
         let mut answer = String::new();
         for _ in 0..(seconds * 10.0) as usize {
-            answer = self.try_say(&format!("query 1 {line}")).map_or_else(|error| error, |a| unescape(&a));
+            answer = self
+                .try_say(&format!("query 1 {line}"))
+                .map_or_else(|error| error, |a| unescape(&a));
             if wanted(&answer) {
                 return answer;
             }

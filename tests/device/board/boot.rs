@@ -23,10 +23,17 @@ fn boots_draws_and_answers() {
     let Some(mut board) = Board::switch_on() else { return };
     board.run(1.5);
     let report = board.report();
-    assert_eq!((report["hclk_hz"].as_u64(), report["on_crystal"].as_bool()), (Some(216_000_000), Some(true)));
+    assert_eq!(
+        (report["hclk_hz"].as_u64(), report["on_crystal"].as_bool()),
+        (Some(216_000_000), Some(true))
+    );
     assert_eq!(report["panel_on"], true);
     assert_eq!(report["serial_names"][0], "EV-Tach");
-    assert!(board.defmt_log().iter().any(|line| line.contains("EV-Tach")), "{:?}", board.defmt_log());
+    assert!(
+        board.defmt_log().iter().any(|line| line.contains("EV-Tach")),
+        "{:?}",
+        board.defmt_log()
+    );
     assert!(board.query("*IDN?").starts_with("EV-Tach,"));
     assert_eq!(board.query("FETC:REAS?"), "\"no_sensor\"");
     let lcd = board.lcd();

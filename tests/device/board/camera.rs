@@ -68,9 +68,14 @@ fn one_rotor_before_a_davis346() {
 
 #[test]
 fn four_rotors() {
-    let at = |x_px, y_px, rpm| Rotor { x_px, y_px, rpm, radius_px: 16.0, blades: 2, ..Rotor::default() };
-    let rotors =
-        vec![at(90.0, 70.0, 700.0), at(250.0, 70.0, -760.0), at(90.0, 190.0, -730.0), at(250.0, 190.0, 790.0)];
+    let at =
+        |x_px, y_px, rpm| Rotor { x_px, y_px, rpm, radius_px: 16.0, blades: 2, ..Rotor::default() };
+    let rotors = vec![
+        at(90.0, 70.0, 700.0),
+        at(250.0, 70.0, -760.0),
+        at(90.0, 190.0, -730.0),
+        at(250.0, 190.0, 790.0),
+    ];
     let mut scene = Scene { rotors, duration_ms: 400.0, ..Scene::default() };
     scene.sensor.noise_hz = 0.5;
     let sees = synthesise(&scene);
@@ -84,10 +89,8 @@ fn four_rotors() {
     let pc = ReadingRow::new(readings.first().expect("a reading on the PC"), 0);
     assert_eq!(pc.rotors.len(), 4);
     for rotor in &pc.rotors {
-        let device: f64 = board
-            .query(&format!("CONF {};:CALC:AVER:MAX?", rotor.id))
-            .parse()
-            .expect("a speed");
+        let device: f64 =
+            board.query(&format!("CONF {};:CALC:AVER:MAX?", rotor.id)).parse().expect("a speed");
         assert_eq!(Some(device), rotor.rpm, "rotor {}", rotor.id);
     }
     board.assert_sound();
@@ -121,57 +124,84 @@ fn the_real_spinning_dot() {
     let dot = load(&folder.join("spinning-dot.evt2.raw")).expect("a recording");
     // Its middle, moved to where the camera's pixels are.
     let half = |wide: u16, narrow: u16| wide.saturating_sub(narrow) / 2;
-    let (left, top) =
-        (half(dot.geometry.width_px, DAVIS346.width_px), half(dot.geometry.height_px, DAVIS346.height_px));
+    let (left, top) = (
+        half(dot.geometry.width_px, DAVIS346.width_px),
+        half(dot.geometry.height_px, DAVIS346.height_px),
+    );
     let events = dot.events.iter().filter_map(|event| {
         let (x, y) = (event.x.checked_sub(left)?, event.y.checked_sub(top)?);
         DAVIS346.contains(x, y).then_some(Event { x, y, ..*event })
     });
     let events = from_zero(events.collect());
     // Nine million events a second, more than the port carries: every so many, as the camera's own skipping would have it.
-    let per_s = events.len() as u64 * 1_000_000 / events.last().map_or(1, |event| event.t_us.max(1));
+    let per_s =
+        events.len() as u64 * 1_000_000 / events.last().map_or(1, |event| event.t_us.max(1));
     let every = usize::try_from(per_s.div_ceil(300_000)).unwrap_or(usize::MAX);
-    let sees =
-        Loaded { geometry: DAVIS346, events: events.into_iter().step_by(every).collect() };
+    let sees = Loaded { geometry: DAVIS346, events: events.into_iter().step_by(every).collect() };
     let (readings, _) = measure(&sees, Capacity::Device);
     let lasts_us = sees.events.last().map_or(0, |event| event.t_us);
     let Some(first) = readings.first().filter(|first| u64::from(first.window_us) < lasts_us) else {
-        show("skipped: the spinning dot is over within its first window: a file has an end, a camera has none");
+        show(
+            "skipped: the spinning dot is over within its first window: a file has an end, a camera has none",
+        );
         return;
     };
     let (rotors, status) = (first.rotors.len(), first.status.as_str());
     assert_reads_as_the_pc(Camera::Davis346, &sees, rotors, status);
 }
 
-/// A stretch of events, long enough for many windows: none is lost, and what every part of the program costs is shown.
-#[test]
-fn five_seconds_without_losing_an_event() {
+/// Five seconds of one rotor: what the camera saw, what each window lost, and what every part of the program cost.
+struct Stretch {
+    /// Events of a window and events lost in it, by the windows that were read.
+    windows: Vec<(u64, u64)>,
+}
+
+fn five_seconds() -> Option<Stretch> {
     let sees = one_rotor(1500.0, 5000.0);
-    let Some(mut board) = Board::switch_on() else { return };
+    let mut board = Board::switch_on()?;
     board.run(0.5);
     board.plug_camera(Camera::Davis346, &sees);
     board.wait_for(3.0, "SYST:SENS?", |answer| answer.starts_with("\"present\""));
     let before = board.report();
-    let mut told = Vec::new();
+    let mut windows = Vec::new();
     for _ in 0..9 {
         board.run(0.5);
+        // Events, thinned, lost.
         let answer = board.query("FETC:EVEN?");
-        let lost = answer.rsplit(',').next().unwrap_or_default();
-        if !lost.starts_with("9.91") {
-            told.push(lost.to_owned());
+        let counts: Vec<u64> = answer.split(',').filter_map(|count| count.parse().ok()).collect();
+        if let [events, _, lost] = counts[..] {
+            windows.push((events, lost));
         }
     }
-    show(&format!("lost in the windows read: {told:?}"));
     let (after, camera) = (board.report(), board.camera());
     let seen = camera["seen"].as_u64().unwrap_or(0);
     assert!(seen > sees.events.len() as u64 * 8 / 10, "{camera}");
     assert_eq!((&camera["filtered"], &camera["dropped"]), (&0.into(), &0.into()), "{camera}");
-    let seconds = after["seconds"].as_f64().unwrap_or(0.0) - before["seconds"].as_f64().unwrap_or(0.0);
+    let seconds =
+        after["seconds"].as_f64().unwrap_or(0.0) - before["seconds"].as_f64().unwrap_or(0.0);
     let mut table = format!("{:.0} kev/s; instructions a second:", seen as f64 / seconds / 1e3);
     for (handler, count) in after["instructions"].as_object().into_iter().flatten() {
-        let spent = count.as_f64().unwrap_or(0.0) - before["instructions"][handler].as_f64().unwrap_or(0.0);
+        let spent =
+            count.as_f64().unwrap_or(0.0) - before["instructions"][handler].as_f64().unwrap_or(0.0);
         table.push_str(&format!("\n  {handler:16} {:7.2} M", spent / seconds / 1e6));
     }
     show(&table);
+    show(&format!("events and lost, by window: {windows:?}"));
     board.assert_sound();
+    Some(Stretch { windows })
+}
+
+#[test]
+fn a_stretch_of_events_is_accounted_for() {
+    let Some(Stretch { windows }) = five_seconds() else { return };
+    assert!(windows.len() > 2, "{windows:?}");
+    let (events, lost) = windows.iter().fold((0, 0), |sum, one| (sum.0 + one.0, sum.1 + one.1));
+    assert!(lost * 20 < events, "more than 5 % lost: {windows:?}");
+}
+
+#[test]
+#[ignore = "a step of the search takes 22 ms, and the blocks hold 11 ms at 385 kev/s: what comes meanwhile is lost, and counted"]
+fn no_event_is_lost() {
+    let Some(Stretch { windows }) = five_seconds() else { return };
+    assert!(windows.iter().all(|(_, lost)| *lost == 0), "{windows:?}");
 }

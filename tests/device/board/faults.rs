@@ -194,7 +194,9 @@ fn a_camera_that_sees_nothing_for_a_minute_starves_nobody() {
     assert_eq!(board.query("FETC:REAS?"), "\"no_events\"");
     assert!(board.query("*IDN?").starts_with("EV-Tach"));
     let spent = |report: &serde_json::Value| {
-        report["instructions"].as_object().map_or(0, |by| by.values().filter_map(|n| n.as_u64()).sum())
+        report["instructions"]
+            .as_object()
+            .map_or(0, |by| by.values().filter_map(|n| n.as_u64()).sum())
     };
     let per_s = (spent(&after) - spent(&before)) / 60;
     evtach_tests::show(&format!("idle camera: {per_s} instructions a second"));

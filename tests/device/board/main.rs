@@ -32,6 +32,7 @@ fn from_zero(mut events: Vec<Event>) -> Vec<Event> {
 
 /// A rotor that a person would point the device at; so many events a second that none is left out.
 fn one_rotor(rpm: f64, duration_ms: f64) -> Loaded {
-    let rotor = Rotor { rpm, radius_px: 20.0, blades: 3, x_px: 180.0, y_px: 120.0, ..Rotor::default() };
+    let rotor =
+        Rotor { rpm, radius_px: 20.0, blades: 3, x_px: 180.0, y_px: 120.0, ..Rotor::default() };
     synthesise(&Scene { rotors: vec![rotor], duration_ms, ..Scene::default() })
 }

@@ -9,7 +9,6 @@ use evtach_firmware::instrument::{Action, Instrument, Page, Picture, Preferences
 use evtach_firmware::ui::{Press, action_at, button};
 use evtach_host::frame::Frame;
 
-
 use crate::board::Board;
 use crate::boot::{differing, drawn};
 
@@ -60,7 +59,12 @@ impl Pair {
     fn compare(&mut self, step: &str) {
         self.steps.push(step.to_owned());
         let (lcd, pc) = (self.board.lcd(), drawn(&self.instrument));
-        assert_eq!(differing(&lcd, &pc), 0, "pixels that differ from the PC's after {:?}", self.steps);
+        assert_eq!(
+            differing(&lcd, &pc),
+            0,
+            "pixels that differ from the PC's after {:?}",
+            self.steps
+        );
         let name = format!("walk_{:02}_{step}.png", self.steps.len());
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("screens/board").join(name);
         if std::env::var_os("EVTACH_RENEW_SCREENS").is_some() {
