@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use evtach_core::{Event, Geometry, Reading, RotorReading, Settings};
 use evtach_host::measure::{Capacity, Summary, measure_events, summarise};
 use evtach_host::recording::{self, OpenOptions, RecordingError};
+use evtach_host::synth::RotorTruth;
 
 /// Writes a table to the test's output, past libtest, which shows what `println!` writes for failed tests only.
 pub fn show(text: &str) {
@@ -57,13 +58,12 @@ pub fn measure(loaded: &Loaded, capacity: Capacity) -> (Vec<Reading>, Summary) {
     let (readings, _) = measure_events(&loaded.events, &[], settings, capacity);
     let first_us = loaded.events.first().map_or(0, |event| event.t_us);
     let last_us = loaded.events.last().map_or(0, |event| event.t_us);
-    let middle_us = first_us + last_us.saturating_sub(first_us) / 2;
-    let summary = summarise(&readings, middle_us, settings.clock_sigma_ppm);
+    let summary = summarise(&readings, &(first_us..last_us), settings.clock_sigma_ppm);
     (readings, summary)
 }
 
 /// What is true of a rotor.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Deserialize)]
 pub struct Truth {
     /// Mean place of the centre in pixels.
     pub centre_px: [f64; 2],
@@ -72,9 +72,23 @@ pub struct Truth {
     /// Blades.
     pub blades: u8,
     /// Mean speed as the camera sees it in rpm, positive clockwise on the screen.
+    #[serde(rename = "rpm_camera_mean_signed")]
     pub rpm_camera: f64,
     /// Mean speed relative to the room in rpm, same sign.
+    #[serde(rename = "rpm_room_mean_signed")]
     pub rpm_room: f64,
+}
+
+impl From<&RotorTruth> for Truth {
+    fn from(rotor: &RotorTruth) -> Self {
+        Self {
+            centre_px: rotor.centre_px,
+            radius_px: rotor.radius_px,
+            blades: rotor.blades,
+            rpm_camera: rotor.rpm_camera_mean_signed,
+            rpm_room: rotor.rpm_room_mean_signed,
+        }
+    }
 }
 
 /// Pairs every true rotor with the measured one nearest to its centre, not farther than half its radius.

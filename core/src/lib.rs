@@ -6,6 +6,7 @@ pub mod decode;
 pub mod event;
 pub mod limits;
 pub mod math;
+mod order;
 pub mod reading;
 pub mod registration;
 pub mod rotors;

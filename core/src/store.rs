@@ -28,7 +28,7 @@ pub const SEGMENTS: usize = WINDOW_SEGMENTS + SPARE_SEGMENTS;
 #[derive(Debug)]
 pub struct Store<'m> {
     events: &'m mut [StoredEvent],
-    /// Events in one segment: 2/8 dense, 3/8 in octaves, 3/8 reservoir.
+    /// Events in one segment: 4/16 dense, 3/16 in octaves, 9/16 reservoir.
     capacity: usize,
     segments: [Segment; SEGMENTS],
     /// Ring position of the oldest segment.

@@ -81,15 +81,14 @@ impl Block {
     /// Keeps the events from the place `from` on for which `kept` holds, and returns how many went.
     pub fn retain(&mut self, from: usize, mut kept: impl FnMut() -> bool) -> usize {
         let before = self.filled;
-        let mut to = from.min(before);
-        for index in to..before {
+        self.filled = from.min(before);
+        for index in self.filled..before {
             if kept() {
-                self.places[to] = self.places[index];
-                to += 1;
+                self.places[self.filled] = self.places[index];
+                self.filled += 1;
             }
         }
-        self.filled = to;
-        before - to
+        before - self.filled
     }
 }
 

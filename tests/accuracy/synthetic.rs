@@ -16,18 +16,7 @@ fn wrong(name: &str, scene: &Scene) -> Vec<String> {
     let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
     let loaded = Loaded { geometry, events: made.events };
     let (_, summary) = measure(&loaded, Capacity::Device);
-    let truths: Vec<Truth> = made
-        .truth
-        .rotors
-        .iter()
-        .map(|rotor| Truth {
-            centre_px: rotor.centre_px,
-            radius_px: rotor.radius_px,
-            blades: rotor.blades,
-            rpm_camera: rotor.rpm_camera_mean_signed,
-            rpm_room: rotor.rpm_room_mean_signed,
-        })
-        .collect();
+    let truths: Vec<Truth> = made.truth.rotors.iter().map(Truth::from).collect();
     let (paired, ghosts) = pair(&truths, &summary);
     let mut wrong = Vec::new();
     for (truth, read) in truths.iter().zip(paired) {

@@ -49,8 +49,8 @@ fn recordings() -> Vec<Vec<Event>> {
 fn measure_in(events: &[Event], width_px: u16, height_px: u16) -> (RotorReading, Speed) {
     let settings = Settings::new(Geometry::new(width_px, height_px).expect("a sensor in range"));
     let (readings, _) = measure_events(events, &[], settings, Capacity::Full);
-    let middle_us = events[0].t_us + (events[events.len() - 1].t_us - events[0].t_us) / 2;
-    let summary = summarise(&readings, middle_us, settings.clock_sigma_ppm);
+    let span_us = events[0].t_us..events[events.len() - 1].t_us;
+    let summary = summarise(&readings, &span_us, settings.clock_sigma_ppm);
     let [rotor] = &summary.rotors[..] else { unreachable!("one rotor was expected: {summary:#?}") };
     (rotor.clone(), rotor.speed.expect("a speed"))
 }
@@ -207,9 +207,15 @@ fn the_rhythm_of_pushing_and_polling_changes_no_bit() {
         };
         let at_once = series(1, u32::MAX);
         assert!(!at_once.is_empty());
-        assert_eq!(at_once, series(300, u32::MAX));
-        // A step or two after every few events: a measurement lasts over many of them.
-        assert_eq!(at_once, series(20, 1));
-        assert_eq!(at_once, series(7, 2));
+        // Few steps after every few events: a measurement lasts over many of them, as on the device.
+        for (piece_events, steps) in
+            [(300, u32::MAX), (7, 2), (16, 1), (20, 1), (64, 8), (128, 16), (256, 32)]
+        {
+            assert_eq!(
+                at_once,
+                series(piece_events, steps),
+                "{piece_events} events, {steps} steps"
+            );
+        }
     }
 }

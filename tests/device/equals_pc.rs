@@ -6,10 +6,8 @@ mod compare;
 use std::env;
 use std::path::{Path, PathBuf};
 
-use evtach_core::{Event, Geometry, Poll, Reading, Settings, Speed};
-use evtach_firmware::report::Lines;
+use evtach_core::{Event, Geometry, Reading, Speed};
 use evtach_host::device::{self, Pace};
-use evtach_host::measure::{Capacity, drain, measure_events, with_tachometer};
 use evtach_host::recording::{self, OpenOptions};
 use evtach_host::synth::scene::Lamp;
 use evtach_host::synth::{self, Rotor, Scene};
@@ -94,39 +92,5 @@ fn real_recordings() {
         let mut events = Vec::new();
         while recording.read_chunk(&mut events).expect("an undamaged recording") {}
         compare(name, recording.geometry, &events);
-    }
-}
-
-/// The device measures a step at a time while events go on arriving; when that happens must not show.
-#[test]
-fn readings_do_not_depend_on_when_the_measurement_ran() {
-    let rotor = Rotor { blades: 3, rpm: 1200.0, ..Rotor::default() };
-    let scene = Scene { duration_ms: 400.0, rotors: vec![rotor], ..Scene::default() };
-    let (geometry, events) = synthesise(&scene);
-    let settings = Settings::new(geometry);
-    let (at_once, _) = measure_events(&events, &[], settings, Capacity::Device);
-    for (piece, steps) in [(1, u32::MAX), (16, 1), (64, 8), (128, 16), (256, 32)] {
-        let (late, overrun) = with_tachometer(settings, Capacity::Device, |tachometer| {
-            let mut readings = Vec::new();
-            for piece in events.chunks(piece) {
-                tachometer.push(piece);
-                if let Poll::Ready(reading) = tachometer.poll(steps) {
-                    readings.push(reading);
-                }
-            }
-            drain(tachometer, |reading| readings.push(reading));
-            tachometer.finish();
-            drain(tachometer, |reading| readings.push(reading));
-            (readings, tachometer.ignored().overrun)
-        });
-        assert_eq!(overrun, 0, "{piece} events a step leave no time to measure");
-        assert_eq!(late.len(), at_once.len(), "{piece} events, {steps} steps");
-        for (late, at_once) in late.iter().zip(&at_once) {
-            assert_eq!(
-                Lines(late).to_string(),
-                Lines(at_once).to_string(),
-                "{piece} events, {steps} steps"
-            );
-        }
     }
 }

@@ -211,6 +211,51 @@ fn power_that_goes_while_settings_are_written_leaves_the_old_ones() {
     assert_eq!(session.query("UNIT?").expect("an answer"), "HZ");
 }
 
+/// The words at the left of the top strip, and how wide they are: the part of it that tells nothing but mode and state.
+fn state_words(screen: &[u8], width_px: Option<usize>) -> (Vec<u8>, usize) {
+    const ROW_BYTES: usize = 2 * 480;
+    /// Rows of the strip, and where its bar of the event rate begins, in pixels.
+    const STRIP: (usize, usize) = (28, 250);
+    let rows = || screen.chunks(ROW_BYTES).take(STRIP.0).map(|row| &row[..2 * STRIP.1]);
+    let drawn =
+        |row: &[u8]| row.chunks(2).rposition(|pixel| pixel != &screen[..2]).unwrap_or(0) + 1;
+    let width_px = width_px.unwrap_or_else(|| rows().map(drawn).max().unwrap_or(0));
+    (rows().flat_map(|row| row[..2 * width_px].to_vec()).collect(), width_px)
+}
+
+#[test]
+fn a_channel_that_is_full_is_saturation_on_screen_and_link() {
+    if !compare::qemu_present() {
+        return;
+    }
+    let rotor = Rotor { rpm: 2400.0, radius_px: 20.0, blades: 2, ..Rotor::default() };
+    let loaded =
+        synthesise(&Scene { rotors: vec![rotor], duration_ms: 8_000.0, ..Scene::default() });
+    let image = device::build().expect("the firmware builds");
+    let mut session =
+        Session::start(&image, Some(&stream(&loaded)), &["full"]).expect("the firmware runs");
+    wait_for(&mut session, "FETC:REAS?", |answer| answer == "\"saturated\"");
+    assert!(session.query("FETC?").expect("an answer").starts_with("9.91"));
+    // Neither restarted nor hung: no fault, and the sensor is still read.
+    assert!(session.query("SYST:FAULT?").expect("an answer").contains("none"));
+
+    let mut instrument = Instrument::new(Preferences::default());
+    instrument.set_sensor(Sensor::Present);
+    instrument.tick(0, Traffic { events: 1, lost: 0 });
+    instrument.tick(200_000, Traffic { events: 1, lost: 100_000 });
+    let mut frame = Frame::default();
+    let Ok(()) = Screen::new().draw(&mut frame, &instrument);
+    let (wanted, width_px) = state_words(&bytes(&frame), None);
+    assert!((60..250).contains(&width_px), "{width_px}");
+    let start = Instant::now();
+    while state_words(&session.query_block("HCOP:SDUM:DATA?").expect("the screen"), Some(width_px))
+        .0
+        != wanted
+    {
+        assert!(start.elapsed() < Duration::from_secs(5), "another state is on the screen");
+    }
+}
+
 #[test]
 fn a_speed_is_read_live_until_the_sensor_goes() {
     if !compare::qemu_present() {

@@ -4,7 +4,7 @@ use evtach_core::{Event, Geometry, PackedEvent, Reading, Reason};
 use evtach_firmware::instrument::{Fault, Preferences, Sensor};
 use evtach_firmware::recorder::Recorder;
 use evtach_firmware::scpi::{
-    Device, Identity, Link, RecorderFailed, RecorderState, RecorderStatus, Statistics, View,
+    Device, Identity, Link, RecorderFailed, RecorderStatus, Statistics, View,
 };
 use evtach_firmware::sensor::usb::Trouble;
 
@@ -181,18 +181,7 @@ impl Device for Bench {
     }
 
     fn recorder(&self) -> RecorderStatus {
-        let Some(recorder) = &self.recorder else { return RecorderStatus::default() };
-        RecorderStatus {
-            state: if recorder.is_running() {
-                RecorderState::Running
-            } else if recorder.is_full() {
-                RecorderState::Full
-            } else {
-                RecorderState::Idle
-            },
-            events: recorder.events(),
-            capacity: recorder.capacity(),
-        }
+        self.recorder.as_ref().map(RecorderStatus::from).unwrap_or_default()
     }
 
     fn start_recording(&mut self, events: u32) -> Result<(), RecorderFailed> {

@@ -3,10 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use evtach_core::{Settings, Speed};
-use evtach_host::measure::{Capacity, measure_events};
-use evtach_host::recording::{self, OpenOptions};
-
 fn interop() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("interop")
 }
@@ -41,7 +37,7 @@ pub fn session(python: &str, port: &str, out: &Path) -> Child {
         .expect("the virtual environment's Python runs")
 }
 
-/// Checks what a session printed and the recording that it saved, from a device of this version.
+/// Checks what a session printed, from a device of this version, and that `evtach measure` reads the recording it saved.
 pub fn check(client: Child, out: &Path, version: &str) {
     let output = client.wait_with_output().expect("a child");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -58,17 +54,19 @@ pub fn check(client: Child, out: &Path, version: &str) {
     assert!(found["log"]["rotors"][0]["rpm"].is_number(), "{found}");
     assert_eq!(found["after"], "1");
 
-    let mut recording = recording::open(out, &OpenOptions::default()).expect("what was fetched");
-    let mut events = Vec::new();
-    while recording.read_chunk(&mut events).expect("an undamaged recording") {}
-    assert_eq!((recording.format, events.len()), ("EV8", 100_000));
-    assert_eq!(recording.side().notes, [""; 0]);
-    let settings = Settings::new(recording.geometry);
-    let (readings, _) = measure_events(&events, &[], settings, Capacity::Device);
-    let speeds = readings.iter().flat_map(|reading| &reading.rotors).filter_map(|r| r.speed);
-    let speeds: Vec<f32> = speeds.map(|s| s.omega_rad_s * Speed::RPM_PER_RAD_S).collect();
-    assert!(!speeds.is_empty(), "no speed in {} events", events.len());
-    assert!(speeds.iter().all(|rpm| (rpm / -1500.0 - 1.0).abs() < 0.01), "{speeds:?}");
+    let measured = Command::new(env!("CARGO"))
+        .args(["run", "--quiet", "--package", "evtach-host", "--", "measure", "--json"])
+        .args(["--capacity", "device"])
+        .arg(out)
+        .output()
+        .expect("cargo runs");
+    let told = String::from_utf8_lossy(&measured.stderr);
+    assert!(measured.status.success(), "evtach measure: {told}");
+    let read: serde_json::Value = serde_json::from_slice(&measured.stdout).expect("JSON");
+    assert_eq!((&read["format"], &read["events"]), (&"EV8".into(), &100_000.into()), "{told}");
+    let rotor = &read["rotors"][0];
+    assert!((rotor["rpm"].as_f64().expect("a speed") / 1500.0 - 1.0).abs() < 0.01, "{read}");
+    assert_eq!(rotor["direction"], "ccw");
 }
 
 /// Where a session's recording goes.

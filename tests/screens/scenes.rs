@@ -1,7 +1,9 @@
 //! Every state and page of the screen, made up so that no recording is needed.
 
 use evtach_core::rotors::HeatMap;
-use evtach_core::{Evidence, Frame, Geometry, Reading, Reason, RotorReading, Speed, Status};
+use evtach_core::{
+    Evidence, Frame, Geometry, PackedEvent, Polarity, Reading, Reason, RotorReading, Speed, Status,
+};
 use evtach_firmware::instrument::{
     Action, Alarm, Fault, Instrument, Mode, Page, Picture, Preferences, Sensor, Setting, Step,
     Traffic, Unit,
@@ -291,7 +293,7 @@ fn picture(rotors: &[Rotor]) -> Picture {
             }
         }
         for _ in 0..events.max(0.0) as u32 {
-            heat.add(x as u16, y as u16);
+            heat.add(&[PackedEvent::new(0, x as u16, y as u16, Polarity::On)]);
         }
     }
     let mut picture = Picture::EMPTY;

@@ -1,7 +1,7 @@
 //! Prophesee EVT 2.0: one event in a 32-bit word.
 
 use super::polarity;
-use crate::event::Event;
+use crate::event::{Event, PackedEvent};
 
 /// Bits of the TIME_HIGH counter, which counts steps of 64 us: it wraps after 2^34 us (4.8 hours).
 const HIGH_BITS: u32 = 28;
@@ -50,6 +50,28 @@ impl Evt2 {
         }
     }
 
+    /// Takes in as many words as there are places, and packs their events. Returns the number of words and of events.
+    pub fn pack(&mut self, words: &[[u8; 4]], places: &mut [PackedEvent]) -> (usize, usize) {
+        let words = &words[..words.len().min(places.len())];
+        let (mut taken, mut filled) = (0, 0);
+        loop {
+            // Nearly all words are events, and all that they need stays the same up to the next time.
+            if self.high.is_some() {
+                let run = pack_run(&words[taken..], &mut places[filled..], self.base_us as u32);
+                taken += run;
+                filled += run;
+            }
+            let Some(word) = words.get(taken) else { return (taken, filled) };
+            self.decode(u32::from_le_bytes(*word), |event| {
+                if let Some(place) = places.get_mut(filled) {
+                    *place = PackedEvent::pack(&event);
+                    filled += 1;
+                }
+            });
+            taken += 1;
+        }
+    }
+
     fn time_high(&mut self, high: u32) {
         // Only a jump back by more than half the range is the counter's wrap; less is a stream out of order.
         if self.high.is_some_and(|before| before > high && before - high > 1 << (HIGH_BITS - 1)) {
@@ -77,6 +99,41 @@ impl Evt2 {
     pub const fn unknown(&self) -> u64 {
         self.unknown
     }
+}
+
+/// Packs events up to the first word that is none, and returns how many.
+fn pack_run(words: &[[u8; 4]], places: &mut [PackedEvent], base_us: u32) -> usize {
+    let mut run = 0;
+    let fours = words.as_chunks::<4>().0.iter().zip(places.as_chunks_mut::<4>().0);
+    for (words, places) in fours {
+        let [a, b, c, d] = words.map(u32::from_le_bytes);
+        if !is_event(a | b | c | d) {
+            break;
+        }
+        *places = [a, b, c, d].map(|word| pack(word, base_us));
+        run += 4;
+    }
+    for (word, place) in words.iter().zip(places).skip(run) {
+        let word = u32::from_le_bytes(*word);
+        if !is_event(word) {
+            break;
+        }
+        *place = pack(word, base_us);
+        run += 1;
+    }
+    run
+}
+
+/// Whether a word is an event, or all of several whose bits it holds are.
+#[inline(always)]
+const fn is_event(word: u32) -> bool {
+    word < 2 << HIGH_BITS
+}
+
+#[inline(always)]
+const fn pack(word: u32, base_us: u32) -> PackedEvent {
+    let (x, y) = ((word >> 11 & 0x7ff) as u16, (word & 0x7ff) as u16);
+    PackedEvent::new(base_us | word >> 22 & 0x3f, x, y, polarity(word >> HIGH_BITS != 0))
 }
 
 #[cfg(test)]

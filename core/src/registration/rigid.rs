@@ -12,9 +12,9 @@ pub struct Rigid {
 }
 
 impl Rigid {
-    /// No turn, no shift.
-    pub const IDENTITY: Self =
-        Self { rotation: Matrix2::new(1.0, 0.0, 0.0, 1.0), shift_px: Vector2::new(0.0, 0.0) };
+    /// None yet: all zeros, which moves every point to the centre.
+    pub(super) const UNSET: Self =
+        Self { rotation: Matrix2::new(0.0, 0.0, 0.0, 0.0), shift_px: Vector2::new(0.0, 0.0) };
 
     /// The rotation by `yaw_rad`, positive = clockwise on the screen.
     #[must_use]
@@ -90,36 +90,35 @@ fn rotation(covariance: Matrix2<f32>) -> Option<Matrix2<f32>> {
 ///
 /// The helicoid swept by a blade is its own tangent plane, so no normals are needed; fewer iterations and less
 /// stop bias than point-to-point.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct PointToHelicoid {
-    normal: Matrix3<f32>,
-    right: Vector3<f32>,
+    /// Sums of the products of radius and direction: the upper half of the normal matrix, row by row.
+    normal: [f32; 6],
+    right: [f32; 3],
 }
 
 /// Weight of "no shift" in matches: keeps the solution finite where a slice shows one edge only.
 const SHIFT_PRIOR: f32 = 2.0;
-
-impl Default for PointToHelicoid {
-    fn default() -> Self {
-        Self {
-            normal: Matrix3::from_diagonal(&Vector3::new(1e-3, SHIFT_PRIOR, SHIFT_PRIOR)),
-            right: Vector3::zeros(),
-        }
-    }
-}
+const YAW_PRIOR: f32 = 1e-3;
 
 impl PointToHelicoid {
-    /// Adds a match: source position, its direction of motion, radius, and the residual along it, in pixels.
-    pub fn add(&mut self, direction: (f32, f32), radius_px: f32, residual_px: f32) {
-        let a = Vector3::new(radius_px, direction.0, direction.1);
-        self.normal.ger(1.0, &a, &a, 1.0);
-        self.right += a * residual_px;
+    /// Adds a match: its direction of motion, radius, and the residual along it, in pixels.
+    pub fn add(&mut self, (x, y): (f32, f32), radius_px: f32, residual_px: f32) {
+        let products = [radius_px * radius_px, radius_px * x, radius_px * y, x * x, x * y, y * y];
+        self.normal.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
+        self.right[0] += radius_px * residual_px;
+        self.right[1] += x * residual_px;
+        self.right[2] += y * residual_px;
     }
 
     /// Further yaw in radians and shift in pixels.
     #[must_use]
     pub fn solve(&self) -> Option<(f32, (f32, f32))> {
-        let solved = self.normal.cholesky()?.solve(&self.right);
+        let [rr, rx, ry, xx, xy, yy] = self.normal;
+        let prior = Vector3::new(YAW_PRIOR, SHIFT_PRIOR, SHIFT_PRIOR);
+        let normal = Matrix3::new(rr, rx, ry, rx, xx, xy, ry, xy, yy);
+        let normal = normal + Matrix3::from_diagonal(&prior);
+        let solved = normal.cholesky()?.solve(&Vector3::from(self.right));
         let finite = solved.iter().all(|value| value.is_finite());
         finite.then_some((solved.x, (solved.y, solved.z)))
     }

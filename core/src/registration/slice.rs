@@ -36,10 +36,12 @@ pub struct Cut {
     /// How many stretches, each one period after the other, are laid over each other: a thinned window holds too few
     /// events in one.
     pub folds: u32,
+    /// Most events, up to the capacity of a slice.
+    pub most: usize,
 }
 
 impl Cut {
-    /// Collects the slice, evenly thinned to the capacity.
+    /// Collects the slice, evenly thinned to the most.
     pub fn collect(&self, window: &Window<'_>, disc: &Moving<'_>, slice: &mut Slice) {
         slice.clear();
         let stretch = |fold: u32| {
@@ -53,10 +55,10 @@ impl Cut {
             let (start_us, events) = stretch(fold);
             for event in events {
                 let Some((x_px, y_px, _)) = disc.place(event) else { continue };
-                if index * SLICE_POINTS >= next {
+                if index * self.most >= next {
                     let tau_s = (event.since(window.start_us) as f32 - start_us) * 1e-6;
                     slice.push(SlicePoint { x_px, y_px, tau_s, on: event.is_on() }).ok();
-                    next += total.max(SLICE_POINTS);
+                    next += total.max(self.most);
                 }
                 index += 1;
             }

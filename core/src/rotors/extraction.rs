@@ -8,6 +8,8 @@
 //!    clusters must be explained by a rotation of its own (see [`super::winding`]).
 //! 4. What a rotor covers is left out, and the search begins again with what remains: a slow rotor among fast
 //!    ones then has all of the memory to itself.
+//! 5. The same in overlapping quarters of the picture: what a small rotor adds to a spectrum drowns in the scatter of all the
+//!    cells that it does not cover, and in a quarter the cells may be smaller and the events more.
 //!
 //! The paper clusters the heat map directly; ARCHITECTURE.md says where that fails and what this changes.
 
@@ -22,8 +24,12 @@ use super::lines::{Line, Lines, Spectrum};
 use super::sweep::sweep;
 use super::visits::Visits;
 use super::winding::Explainer;
-use crate::limits::{COHERENCE_CELLS, MAX_CANDIDATES, MAX_CLUSTERS, MAX_LINES, MAX_ROTORS};
+use crate::event::Geometry;
+use crate::limits::{
+    COHERENCE_CELLS, MAX_CANDIDATES, MAX_CLUSTERS, MAX_LINES, MAX_ROTORS, VISIT_CELLS, VISITS,
+};
 use crate::math::{TAU, sqrt};
+use crate::order::sort_few;
 use crate::speed::polar::{PolarTrack, track};
 use crate::store::{StoredEvent, Window};
 
@@ -46,6 +52,13 @@ const LEAST_COMPANY: f32 = 3.0;
 const COARSEST_LOG2: u8 = 4;
 /// Fewest events that are searched.
 const LEAST_EVENTS: usize = 100;
+/// Quarters of the picture that are searched after the whole of it: half of its width and height, in steps of half of that.
+const QUARTERS_A_SIDE: usize = 3;
+const QUARTERS: usize = QUARTERS_A_SIDE * QUARTERS_A_SIDE;
+/// Lines that are looked into in the quarters, all together, and in how many quarters each: a shaken background shows its
+/// own in all of them.
+const QUARTER_LOOKS: usize = 8;
+const QUARTERS_A_LINE: usize = 2;
 
 /// A rotor as extraction sees it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -96,6 +109,11 @@ pub struct Extraction {
     /// Clustering with the lowest index so far.
     best_index: f32,
     best: Vec<Cluster, MAX_CLUSTERS>,
+    /// Quarter of the picture that is searched, from 1 on; 0 = all of it.
+    quarter: usize,
+    /// Smallest cells worth trying in a quarter, as a power of two: those that did for the whole, or half as wide where there
+    /// were more events than memory.
+    least_log2: u8,
     /// Cells of the visits: as fine as the events allow.
     grid: CellGrid,
     /// Grid of the local map at hand.
@@ -191,15 +209,19 @@ impl Extraction {
             return self.end();
         }
         if self.grid.is_empty() {
-            self.grid = view.grid;
+            self.grid = self.finest(view);
         }
         let (events, company) = scratch.visits.fill(&view.window, self.grid, &self.taken);
         if events < LEAST_EVENTS {
-            return self.end();
+            return if self.quarter == 0 { self.end() } else { self.next_quarter() };
         }
         if company < LEAST_COMPANY && self.grid.cell_log2 < COARSEST_LOG2 {
             self.grid = self.grid.coarser();
             return;
+        }
+        if self.quarter == 0 {
+            let capped = events > VISITS / 4 * 3;
+            self.least_log2 = self.grid.cell_log2.saturating_sub(u8::from(capped)).max(2);
         }
         spectrum.clear();
         self.stage = Stage::Lags;
@@ -213,6 +235,35 @@ impl Extraction {
         }
     }
 
+    /// The finest cells for what is searched.
+    fn finest(&self, view: &View<'_>) -> CellGrid {
+        let Some(number) = self.quarter.checked_sub(1) else { return view.grid };
+        let CellGrid { columns, rows, cell_log2, .. } = view.grid;
+        let half = |cells: usize| ((cells << cell_log2) / 2) as u16;
+        let (width_px, height_px) = (half(columns), half(rows));
+        let (column, row) = (number % QUARTERS_A_SIDE, number / QUARTERS_A_SIDE);
+        let geometry = Geometry { width_px, height_px };
+        CellGrid {
+            x0: width_px / 2 * column as u16,
+            y0: height_px / 2 * row as u16,
+            ..CellGrid::fit(geometry, self.least_log2, view.weights.len().min(VISIT_CELLS))
+        }
+    }
+
+    /// Goes on with the next quarter of the picture, or ends.
+    fn next_quarter(&mut self) {
+        if self.quarter == QUARTERS || self.taken.is_full() {
+            return self.end();
+        }
+        if self.quarter == 0 {
+            self.looks = 0;
+            self.tried.clear();
+        }
+        self.quarter += 1;
+        self.grid = CellGrid::default();
+        self.stage = Stage::Visits;
+    }
+
     fn end(&mut self) {
         if self.candidates.is_empty() && self.stage != Stage::Slow && self.swept.is_none() {
             self.stage = Stage::Sweep;
@@ -220,12 +271,18 @@ impl Extraction {
         }
         // A piece of a rotor, or a rotor by the line of its neighbour, explains fewer events than the rotor by
         // its own line.
-        self.candidates.sort_unstable_by(|a, b| b.explained.total_cmp(&a.explained));
+        sort_few(&mut self.candidates, |a, b| a.explained.total_cmp(&b.explained).is_gt());
         self.stage = Stage::Done;
     }
 
     /// Where nothing passes anywhere twice: looks for what turns slowly in the middle of all that moves.
     fn sweep(&mut self, view: &mut View<'_>, polar: &mut PolarTrack, scratch: &mut Scratch) {
+        self.grid = view.grid;
+        while scratch.visits.fill(&view.window, self.grid, &[]).1 < LEAST_COMPANY
+            && self.grid.cell_log2 < COARSEST_LOG2
+        {
+            self.grid = self.grid.coarser();
+        }
         let Some(weights) = view.weights.get_mut(..self.grid.len()) else { return self.end() };
         scratch.visits.heat(weights);
         let cells = self.cells(view);
@@ -265,11 +322,14 @@ impl Extraction {
     /// Fills the map of the next line and asks whether one rotation explains it all.
     fn map(&mut self, view: &mut View<'_>, scratch: &mut Scratch) {
         let width_hz = SAME_LINE * 1e6 / view.window.duration_us.max(1) as f32;
-        let Some(line) = self.lines.pop() else { return self.end() };
-        if self.tried.iter().any(|hz| (hz - line.hz).abs() < width_hz) {
+        let Some(line) = self.lines.pop() else { return self.next_quarter() };
+        let known = self.tried.iter().filter(|hz| (**hz - line.hz).abs() < width_hz).count();
+        let (most, looks) =
+            if self.quarter == 0 { (1, MAX_LINES) } else { (QUARTERS_A_LINE, QUARTER_LOOKS) };
+        if known >= most {
             return;
         }
-        if self.looks == MAX_LINES {
+        if self.looks == looks {
             return self.end();
         }
         self.looks += 1;
@@ -316,15 +376,20 @@ impl Extraction {
         }
         let (region, _, _, winding) = scratch.explainer.result();
         let empty = region.len() < LEAST_PHASORS;
-        if winding.windings == 0 && winding.share > SHARE_OF_ONE && !empty {
+        if self.quarter == 0 && winding.windings == 0 && winding.share > SHARE_OF_ONE && !empty {
             self.in_step_hz = self.in_step_hz.or(Some(self.line.hz));
         }
         self.whole = believe(&scratch.explainer, self.line.hz, self.local);
         if let Some(whole) = self.whole
-            && whole.share >= SHARE_OF_ONE
+            && (whole.share >= SHARE_OF_ONE || self.quarter > 0)
         {
             self.take(whole);
             self.stage = Stage::Visits;
+            return;
+        }
+        if self.quarter > 0 {
+            // Two in a quarter were told apart in the whole, or are in quarters of their own.
+            self.stage = Stage::Map;
             return;
         }
         self.k = 2;
@@ -400,7 +465,9 @@ impl Extraction {
     fn take(&mut self, found: Found) {
         let radius_px = COVERED * found.disc.radius_px;
         self.taken.push(Disc { radius_px, ..found.disc }).ok();
-        self.tried.clear();
+        if self.quarter == 0 {
+            self.tried.clear();
+        }
         self.enter(found);
         self.grid = CellGrid::default();
     }

@@ -3,6 +3,7 @@
 use heapless::Vec;
 
 use crate::math::{Turn, sqrt};
+use crate::order::sort_few;
 
 /// Bins of the autocorrelation over the window's length: 150 ms / 1 024 = 146 us, so 3.4 kHz is the highest frequency.
 pub const LAGS: usize = 1_024;
@@ -97,7 +98,7 @@ impl Spectrum {
                 *least = line;
             }
         }
-        lines.sort_unstable_by(|a, b| b.sigmas.total_cmp(&a.sigmas));
+        sort_few(&mut lines, |a, b| a.sigmas.total_cmp(&b.sigmas).is_gt());
         fundamental_first(&mut lines, hz);
         lines
     }

@@ -8,6 +8,7 @@
 use heapless::Vec;
 
 use crate::math::{TAU, Turn, TurnRate};
+use crate::order::sort_few;
 use crate::speed::polar::PolarEvent;
 
 /// Angular harmonics that are looked at.
@@ -50,7 +51,7 @@ pub fn sweep(track: &[PolarEvent], window_us: u32) -> Vec<f32, PEAKS> {
             }
         }
     }
-    peaks.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+    sort_few(&mut peaks, |a, b| a.0.total_cmp(&b.0).is_gt());
     peaks.into_iter().map(|(_, hz)| hz).collect()
 }
 

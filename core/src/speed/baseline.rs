@@ -23,6 +23,17 @@ const SLICE_EVENTS: f32 = 400.0;
 /// Most periods folded into a slice.
 const MOST_FOLDS: u32 = 32;
 
+/// How much work goes into slice pairs.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Pairs.
+    pub pairs: u32,
+    /// Events in a slice at most.
+    pub points: usize,
+    /// A registration ends when an iteration turns by less than this share of its noise.
+    pub settled: f32,
+}
+
 /// What is known of a rotor when its slices are cut.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
@@ -62,7 +73,7 @@ pub struct Pairs {
     pace: Pace,
     /// Baseline in symmetry periods.
     periods: f32,
-    pairs: u32,
+    effort: Effort,
     next: u32,
     folds: u32,
     /// Whether the next pair is being registered.
@@ -73,22 +84,21 @@ pub struct Pairs {
 }
 
 impl Pairs {
-    /// Plans `pairs` slice pairs, `periods` symmetry periods apart. `events` is the number of the rotor's
-    /// events in the window.
+    /// Plans slice pairs `periods` symmetry periods apart. `events` is the number of the rotor's events in the window.
     #[must_use]
-    pub fn plan(pace: Pace, periods: f32, pairs: u32, events: usize, window_us: u32) -> Self {
+    pub fn plan(pace: Pace, periods: f32, effort: Effort, events: usize, window_us: u32) -> Self {
         let period_us = pace.period_us();
         let in_slice = events as f32 * SLICE_PERIODS * period_us / window_us.max(1) as f32;
         let room = (window_us as f32 / period_us - periods - SLICE_PERIODS).max(0.0);
         let folds = (SLICE_EVENTS / in_slice.max(1.0)) as u32;
         let folds = folds.clamp(1, MOST_FOLDS).min(1 + (0.5 * room) as u32);
-        let pairs = pairs.min(MAX_PAIRS as u32);
+        let pairs = effort.pairs.min(MAX_PAIRS as u32);
         let span = folds as f32 - 1.0 + SLICE_PERIODS;
         let independent = (1.0 + room / span).min(pairs as f32);
         Self {
             pace,
             periods,
-            pairs,
+            effort: Effort { pairs, ..effort },
             next: 0,
             folds,
             registering: false,
@@ -100,7 +110,7 @@ impl Pairs {
     /// Cuts the next pair, or advances its registration by one iteration; `true` once all are done.
     /// Cost: at most a million instructions.
     pub fn step(&mut self, window: &Window<'_>, path: &Path, icp: &mut Icp) -> bool {
-        if self.next >= self.pairs {
+        if self.next >= self.effort.pairs {
             return true;
         }
         let angle_rad = self.pace.signed_angle_rad();
@@ -108,7 +118,8 @@ impl Pairs {
         if !self.registering {
             self.cut(window, path, icp);
             let residual = Residual::Helicoid { omega_rad_s: self.pace.omega_rad_s };
-            icp.start(start_rad, self.pace.disc.radius_px, residual);
+            let radius_px = self.pace.disc.radius_px;
+            icp.start(start_rad, radius_px, residual, self.effort.settled);
             self.registering = true;
             return false;
         }
@@ -118,7 +129,7 @@ impl Pairs {
         }
         self.registering = false;
         self.next += 1;
-        self.next >= self.pairs
+        self.next >= self.effort.pairs
     }
 
     /// Cuts the two slices of the next pair.
@@ -129,10 +140,11 @@ impl Pairs {
         let room_us = (window.duration_us as f32 - baseline_us - span_us).max(0.0);
         let disc = Moving::new(self.pace.disc, path, window);
         let mut cut = Cut {
-            start_us: room_us * self.next as f32 / (self.pairs.max(2) - 1) as f32,
+            start_us: room_us * self.next as f32 / (self.effort.pairs.max(2) - 1) as f32,
             length_us: SLICE_PERIODS * period_us,
             period_us,
             folds: self.folds,
+            most: self.effort.points,
         };
         cut.collect(window, &disc, &mut icp.first);
         cut.start_us += baseline_us;

@@ -32,6 +32,9 @@ const SEEN_PX: f32 = 3.0;
 const MOST_TURN_RAD: f32 = 1.2;
 const MOST_BLUR_RAD: f32 = 0.5;
 
+/// Share of a registration's noise below which a turn is the last.
+const SETTLED: f32 = 0.1;
+
 /// Speed by each burst, in rad/s.
 pub type Rates = Vec<f32, WINDOW_SEGMENTS>;
 
@@ -129,7 +132,7 @@ impl Ladder {
             return false;
         }
         let start_rad = self.rate.map_or(0.0, |rate| rate * baseline_s);
-        icp.start(start_rad, self.disc.radius_px, Residual::FixedAxis);
+        icp.start(start_rad, self.disc.radius_px, Residual::FixedAxis, SETTLED);
         self.baseline_s = baseline_s;
         true
     }
@@ -175,7 +178,14 @@ fn take(
 /// The median of values, which it sorts.
 #[must_use]
 pub fn median(values: &mut [f32]) -> Option<f32> {
-    values.sort_unstable_by(f32::total_cmp);
+    // Few values: an insertion sort is a hundredth of the library's code.
+    for sorted in 1..values.len() {
+        let mut at = sorted;
+        while at > 0 && values[at - 1] > values[at] {
+            values.swap(at - 1, at);
+            at -= 1;
+        }
+    }
     let middle = values.len() / 2;
     if values.len() % 2 == 1 {
         values.get(middle).copied()

@@ -1,6 +1,7 @@
 //! The measurement of one rotor in one window, step by step: the paper's stages and the lock beyond them.
 
 mod baselines;
+mod doubt;
 mod verdict;
 
 use super::baseline::{Estimate, Pairs};
@@ -15,14 +16,15 @@ use crate::reading::{Evidence, Frame, Reason, Speed, Status};
 use crate::registration::Icp;
 use crate::rotors::{Disc, Found};
 use crate::store::{WINDOW_SEGMENTS, Window};
-use baselines::{REFINEMENT_PAIRS, REFINEMENT_PERIODS};
+use baselines::{REFINEMENT, REFINEMENT_PERIODS};
+use doubt::{DOUBTFUL, Doubt};
 
 /// Steps of centre and speed by the polar phase.
 const NEWTON_STEPS: u8 = 6;
+/// A step that moves the centre, and the rim at the window's ends, by less than this is the last.
+const LAST_STEP_PX: f32 = 0.1;
 /// Relative error of the speed of a rotor that is followed from window to window.
 const FOLLOWING_SIGMA: f32 = 1e-3;
-/// A rotor keeps at least this share of its events in step.
-const LEAST_COHERENCE: f32 = 0.3;
 /// Share in step of the second best harmonic over that of the best: beyond this the pattern stands, or the centre is off.
 const MOST_STANDING: f32 = 0.8;
 /// Two coarse speeds contradict each other when they differ by more than half the way to the next speed that the line
@@ -30,12 +32,6 @@ const MOST_STANDING: f32 = 0.8;
 /// slices falls short of the turn by up to a tenth.
 const COARSE_AGREEMENT: f32 = 0.15;
 const MOST_COARSE_AGREEMENT: f32 = 0.25;
-/// Blur of the rotor's edges, as a share of its radius and in pixels for a small one, beyond which they are no edges;
-/// and within which they are so sharp that a registration that went astray does not count against them.
-const MOST_BLUR: (f32, f32) = (0.1, 1.5);
-const LEAST_BLUR: (f32, f32) = (0.06, 1.3);
-/// What the jitter of the events in dim light may add to it.
-const MOST_JITTER_S: f32 = 150e-6;
 /// Two harmonics of one line differ by a fifteenth or more.
 const SCAN_AGREEMENT: f32 = 0.04;
 /// Fewest events of a rotor that are measured.
@@ -71,6 +67,7 @@ enum Stage {
     #[default]
     Newton,
     Scan,
+    Doubt,
     Symmetry,
     Pose,
     Initial,
@@ -104,6 +101,8 @@ pub struct Measurement {
     follows: bool,
     /// Whether the scan has already sent the measurement back once.
     second_look: bool,
+    /// Looks about the centre for a harmonic that keeps step better.
+    doubt: Option<Doubt>,
     disc: Disc,
     omega_rad_s: f32,
     /// Angular harmonic whose phase is followed.
@@ -139,6 +138,7 @@ impl Measurement {
             turn: 0,
             follows: false,
             second_look: false,
+            doubt: None,
             disc: found.disc,
             omega_rad_s: found.omega_rad_s,
             harmonic: found.windings,
@@ -186,6 +186,7 @@ impl Measurement {
         match self.stage {
             Stage::Newton => self.newton(window, polar),
             Stage::Scan => self.scan(polar),
+            Stage::Doubt => self.doubt(window, polar),
             Stage::Symmetry => self.symmetry(stated, polar),
             Stage::Pose => self.pose(window, sums),
             Stage::Initial => self.initial(window, icp),
@@ -207,7 +208,7 @@ impl Measurement {
     pub const fn stage(&self) -> &'static str {
         match self.stage {
             Stage::Newton => "centre",
-            Stage::Scan => "scan",
+            Stage::Scan | Stage::Doubt => "scan",
             Stage::Symmetry => "symmetry",
             Stage::Pose => "pose",
             Stage::Initial => "initial",
@@ -229,22 +230,25 @@ impl Measurement {
     fn newton(&mut self, window: &Window<'_>, polar: &mut PolarTrack) {
         if self.turn == 0 {
             self.events = track(window, self.disc, polar);
+            self.turn = 1;
+            return;
         }
         self.evidence.events = self.events as u32;
         if self.events < LEAST_EVENTS {
             return self.refuse(Reason::TooFewEvents);
         }
-        if self.turn < NEWTON_STEPS {
-            self.turn += 1;
-            if !self.step_centre(window, polar) {
-                self.refuse(Reason::NoRotation);
+        if self.turn <= NEWTON_STEPS {
+            match self.step_centre(window, polar) {
+                None => self.refuse(Reason::NoRotation),
+                Some(true) => self.turn = NEWTON_STEPS + 1,
+                Some(false) => self.turn += 1,
             }
             return;
         }
         let coherence =
             Pattern::learn(polar, self.disc, self.omega_rad_s, self.harmonic).coherence();
         self.evidence.coherence = Some(coherence);
-        if coherence < LEAST_COHERENCE {
+        if coherence < self.least_coherence() {
             return self.refuse(Reason::NoRotation);
         }
         self.stage = Stage::Scan;
@@ -270,6 +274,11 @@ impl Measurement {
         self.evidence.scan_standing = Some(standing);
         if scan.best == 0 {
             return self.refuse(Reason::NoRotation);
+        }
+        if standing > DOUBTFUL && self.doubt.is_none() {
+            self.doubt = Some(Doubt::new(self.disc, line_hz));
+            self.stage = Stage::Doubt;
+            return;
         }
         let omega_rad_s = line_hz * TAU / scan.best as f32;
         if (omega_rad_s - self.omega_rad_s).abs() > SCAN_AGREEMENT * omega_rad_s.abs() {
@@ -322,7 +331,7 @@ impl Measurement {
             let parts = if self.alike { u32::from(self.parts.unwrap_or(1)).max(1) } else { 1 };
             let pose =
                 Pose::new(self.disc, self.omega_rad_s, parts, self.harmonic, window.duration_us);
-            let pose = if self.alike { pose } else { pose.unlike() };
+            let pose = if self.alike { pose } else { pose.unlike(self.parts.unwrap_or(1)) };
             self.pose = if self.follows { pose.known() } else { pose };
         }
         if !self.pose.step(window, sums) {
@@ -344,7 +353,7 @@ impl Measurement {
                 self.alpha_rad_s2 = Some(found.alpha_rad_s2);
             }
         }
-        if !self.sharp(MOST_BLUR) {
+        if !self.has_edges() {
             return self.refuse(Reason::Ambiguous);
         }
         if !self.follows {
@@ -352,7 +361,7 @@ impl Measurement {
             return;
         }
         self.evidence.coherence = Some(self.pose.first_coherence());
-        if self.pose.first_coherence() < LEAST_COHERENCE {
+        if self.pose.first_coherence() < self.least_coherence() {
             return self.refuse(Reason::NoRotation);
         }
         self.count_periods(window);
@@ -360,24 +369,18 @@ impl Measurement {
         self.stage = Stage::Lock;
     }
 
-    /// Whether the rotor's edges are at least so sharp.
-    fn sharp(&self, (share, px): (f32, f32)) -> bool {
-        let radius_px = self.disc.radius_px;
-        let jitter_px = 0.5 * radius_px * self.omega_rad_s.abs() * MOST_JITTER_S;
-        self.pose.sharpness_px() < (share * radius_px).max(px) + jitter_px
-    }
-
-    /// One Newton step of centre and speed; `false` when the phase gives none.
-    fn step_centre(&mut self, window: &Window<'_>, polar: &mut PolarTrack) -> bool {
-        let found = newton(polar, self.disc, self.omega_rad_s, self.harmonic, window.duration_us);
-        let Some(step) = found else { return false };
+    /// One Newton step of centre and speed: whether it was so small that it is the last, or `None` when the phase gives none.
+    fn step_centre(&mut self, window: &Window<'_>, polar: &mut PolarTrack) -> Option<bool> {
+        let step = newton(polar, self.disc, self.omega_rad_s, self.harmonic, window.duration_us)?;
         let reach_px = 0.3 * self.disc.radius_px;
         // Not `clamp`, whose panic on a wrong order of bounds pulls float formatting into the image.
         self.disc.x_px += step.dx_px.max(-reach_px).min(reach_px);
         self.disc.y_px += step.dy_px.max(-reach_px).min(reach_px);
         self.omega_rad_s += step.domega_rad_s;
         self.events = track(window, self.disc, polar);
-        true
+        let half_s = 0.5e-6 * window.duration_us as f32;
+        let turned_px = step.domega_rad_s * half_s * self.disc.radius_px;
+        Some(step.dx_px.abs().max(step.dy_px.abs()).max(turned_px.abs()) < LAST_STEP_PX)
     }
 
     /// Initial alignment in every other segment: second coarse witness.
@@ -407,7 +410,7 @@ impl Measurement {
             .evidence
             .initial_rad_s
             .is_some_and(|initial| (initial - self.omega_rad_s).abs() < agreement);
-        if !agrees && !self.sharp(LEAST_BLUR) {
+        if !agrees && !self.sharp() {
             return self.refuse(Reason::Ambiguous);
         }
         let periods = self.count_periods(window);
@@ -422,7 +425,7 @@ impl Measurement {
             self.stage = Stage::Verdict;
             return;
         }
-        self.plan(window, REFINEMENT_PERIODS, self.worth(REFINEMENT_PAIRS));
+        self.plan(window, REFINEMENT_PERIODS, self.worth(REFINEMENT));
         self.stage = Stage::Refinement;
     }
 

@@ -7,6 +7,7 @@ pub mod path;
 pub mod phase;
 pub mod polar;
 pub mod pose;
+pub mod queue;
 pub mod statistics;
 pub mod symmetry;
 pub mod trend;

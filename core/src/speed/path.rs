@@ -26,16 +26,18 @@ pub struct Path {
     /// Time of the first knot since the middle of the window.
     start_us: f32,
     step_us: f32,
+    /// Blocks in a microsecond.
+    per_us: f32,
 }
 
 impl Path {
     /// An axis at rest and an even turn.
-    pub const STILL: Self = Self { knots: Vec::new(), start_us: 0.0, step_us: 1.0 };
+    pub const STILL: Self = Self { knots: Vec::new(), start_us: 0.0, step_us: 1.0, per_us: 1.0 };
 
     /// The same way through knots `step_us` apart from `start_us` on: `blocks` of them and one more.
     #[must_use]
     pub fn divided(&self, start_us: f32, step_us: f32, blocks: usize) -> Self {
-        let mut path = Self { knots: Vec::new(), start_us, step_us };
+        let mut path = Self { knots: Vec::new(), start_us, step_us, per_us: 1.0 / step_us };
         for k in 0..=blocks.clamp(1, MAX_KNOTS - 1) {
             path.knots.push(self.at(start_us + k as f32 * step_us)).ok();
         }
@@ -80,15 +82,21 @@ impl Path {
     /// The block that an instant lies in, and how far through it: 0 to 1, beyond it outside the path.
     #[must_use]
     pub fn place(&self, t_us: f32) -> (usize, f32) {
-        let place = (t_us - self.start_us) / self.step_us;
-        let index = (place.max(0.0) as usize).min(self.blocks().saturating_sub(1));
+        let place = (t_us - self.start_us) * self.per_us;
+        // Casting a negative float gives 0.
+        let index = (place as usize).min(self.blocks().saturating_sub(1));
         (index, place - index as f32)
     }
 
     /// Where the rotor was `t_us` after the middle of the window.
     #[must_use]
     pub fn at(&self, t_us: f32) -> Knot {
-        let (index, f) = self.place(t_us);
+        self.between(self.place(t_us))
+    }
+
+    /// Where the rotor was so far through a block.
+    #[must_use]
+    pub fn between(&self, (index, f): (usize, f32)) -> Knot {
         let (Some(a), Some(b)) = (self.knots.get(index), self.knots.get(index + 1)) else {
             return Knot::default();
         };
@@ -121,6 +129,12 @@ impl<'p> Moving<'p> {
     #[must_use]
     pub fn place(&self, event: StoredEvent) -> Option<(f32, f32, f32)> {
         let knot = self.path.at(self.since_middle_us(event) as f32);
+        self.place_by(event, knot)
+    }
+
+    /// The same, where the path is known for the instant of the event.
+    #[must_use]
+    pub fn place_by(&self, event: StoredEvent, knot: Knot) -> Option<(f32, f32, f32)> {
         self.annulus.place_from(event, (knot.x_px, knot.y_px))
     }
 

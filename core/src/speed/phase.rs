@@ -9,7 +9,7 @@
 use nalgebra::{Matrix4, Vector4};
 
 use super::polar::PolarEvent;
-use crate::math::{TAU, Turn, TurnRate};
+use crate::math::{TAU, Turn, TurnRate, larger};
 use crate::rotors::Disc;
 
 /// Rings between centre and rim.
@@ -151,24 +151,32 @@ pub fn newton(
     let m = harmonic as f32;
     let per_us = 1.0 / window_us.max(1) as f32;
     let turns = pattern.turns();
-    let mut normal = Matrix4::<f32>::zeros();
-    let mut right = Vector4::<f32>::zeros();
+    // Sums of the levers of centre and time and of their products, without m and the radius; those with the sine.
+    let (mut levers, mut products, mut right) = ([0.0_f32; 3], [0.0_f32; 6], [0.0_f32; 4]);
     let mut in_step = 0.0;
     for event in track {
         let psi = phase(*event, rate, harmonic).minus(turns[bank(*event, disc)]);
         let (sin_psi, cos_psi) = psi.sin_cos();
         let (sin, cos) = event.angle().sin_cos();
-        let lever = m * disc.radius_px / event.radius_px().max(1.0);
-        let a = Vector4::new(-sin * lever, cos * lever, m * event.t_us as f32 * per_us, m);
-        normal.ger(1.0, &a, &a, 1.0);
-        right += a * sin_psi;
+        let per_r = disc.radius_px / larger(event.radius_px(), 1.0);
+        let (x, y, t) = (-sin * per_r, cos * per_r, event.t_us as f32 * per_us);
+        levers[0] += x;
+        levers[1] += y;
+        levers[2] += t;
+        let added = [x * x, x * y, x * t, y * y, y * t, t * t];
+        products.iter_mut().zip(added).for_each(|(sum, product)| *sum += product);
+        let added = [x * sin_psi, y * sin_psi, t * sin_psi, sin_psi];
+        right.iter_mut().zip(added).for_each(|(sum, product)| *sum += product);
         in_step += cos_psi;
     }
-    let share = in_step / (track.len() as f32).max(1.0);
+    let count = track.len() as f32;
+    let share = in_step / count.max(1.0);
     if share <= 0.0 {
         return None;
     }
-    let solved = (normal * share).cholesky()?.solve(&right);
+    let ([x, y, t], [xx, xy, xt, yy, yt, tt]) = (levers, products);
+    let normal = Matrix4::new(xx, xy, xt, x, xy, yy, yt, y, xt, yt, tt, t, x, y, t, count);
+    let solved = (normal * (m * share)).cholesky()?.solve(&Vector4::from(right));
     Some(Step {
         dx_px: solved[0] * disc.radius_px,
         dy_px: solved[1] * disc.radius_px,

@@ -3,7 +3,7 @@
 use heapless::Vec;
 
 use crate::limits::POLAR_EVENTS;
-use crate::math::{Turn, sqrt};
+use crate::math::{Turn, quick_sqrt};
 use crate::rotors::Disc;
 use crate::store::{StoredEvent, Window};
 
@@ -81,7 +81,7 @@ impl PolarEvent {
     fn new(event: StoredEvent, place: (f32, f32, f32), start_us: u64, mid_us: i32) -> Self {
         let (dx, dy, r2) = place;
         let angle = (Turn::of_vector(dy, dx).0 >> 16) as u16;
-        let radius = ((sqrt(r2) * 16.0) as u16).min(0x7FFF);
+        let radius = ((quick_sqrt(r2) * 16.0) as u16).min(0x7FFF);
         let polarity = if event.is_on() { 0x8000 } else { 0 };
         Self { t_us: event.since(start_us) - mid_us, angle, radius_polarity: radius | polarity }
     }

@@ -11,24 +11,25 @@
 //! the trend gets an offset for each place in the period: what is fixed to the pixels cancels.
 
 mod blocks;
+mod schedule;
 mod template;
 
 use heapless::Vec;
-use nalgebra::Vector3;
 
 use super::baseline::Estimate;
 use super::path::{Knot, Moving, Path};
 use super::statistics::student_over_normal;
 use super::trend::{Point, Trend};
 use crate::limits::MAX_KNOTS;
-use crate::math::{TAU, Turn, TurnRate, sqrt};
+use crate::math::{TAU, Turn, TurnRate, quick_sqrt, sqrt};
 use crate::rotors::Disc;
 use crate::store::Window;
-use blocks::{BLOCK_SHARE, Block, LEAST_SHARE, WALK_PX, WALK_SINGLE_PX, Walk, correct};
-use template::{BANKS, RINGS, Template};
+use blocks::{BLOCK_SHARE, Block, LEAST_SHARE, WALK_PX, WALK_SINGLE_PX, WALK_US, Walk, correct};
+use schedule::{Phase, Schedule};
+use template::{BANKS, Counts, RINGS, Template};
 
 /// Events that a block should hold.
-const BLOCK_EVENTS: usize = 64;
+const BLOCK_EVENTS: usize = 32;
 /// Shortest block: a hand trembles up to 12 Hz, a host shakes up to some 60 Hz.
 const SHORTEST_BLOCK_US: f32 = 3_000.0;
 /// Most blocks in a symmetry period.
@@ -39,42 +40,10 @@ const FOLDED_PERIODS: usize = 3;
 const MOST_HARMONIC: u32 = 96;
 /// A doubled harmonic must keep this share of the events in step that were so at first.
 const SHARP_COHERENCE: f32 = 0.5;
+/// Share of the events in step that edges as sharp as can be seen leave there.
+const SEEN_COHERENCE: f32 = 0.75;
 /// Blocks over which the wandering of the axis is judged.
 const DRIFT_BLOCKS: usize = 12;
-/// Blocks of the path at first, and once these fit.
-const FIRST_BLOCKS: usize = 12;
-const SECOND_BLOCKS: usize = 24;
-
-/// What is done in which round.
-#[derive(Clone, Copy, Debug)]
-struct Schedule {
-    /// Rounds from which on the path has more blocks, as many as the events allow, and as many as all of them allow.
-    second: u8,
-    fine: u8,
-    all: u8,
-    /// The last that corrects the path; one more look gives the trend.
-    last: u8,
-    /// Events looked at before `all`, and the share and number of all events looked at from then on.
-    first_events: usize,
-    share: usize,
-    most_events: usize,
-}
-
-impl Schedule {
-    /// For a rotor of which little is known.
-    const NEW: Self = Self {
-        second: 4,
-        fine: 5,
-        all: 11,
-        last: 13,
-        first_events: 3_072,
-        share: 1,
-        most_events: 65_536,
-    };
-    /// For a rotor that was followed in the window before: a third of the events tell it as well.
-    const KNOWN: Self =
-        Self { second: 2, fine: 3, all: 6, last: 7, first_events: 1_536, share: 3, ..Self::NEW };
-}
 
 /// The turn followed through the window.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -93,14 +62,20 @@ pub struct Slope {
 #[derive(Clone, Debug)]
 pub struct Sums {
     blocks: [Block; MAX_KNOTS],
+    counts: Counts,
+    /// At the harmonic that is followed, and at twice it.
     low: Template,
     high: Template,
 }
 
 impl Sums {
     /// Nothing looked at. A constant, so that it is copied into place instead of being built on the stack.
-    pub const EMPTY: Self =
-        Self { blocks: [Block::EMPTY; MAX_KNOTS], low: Template::EMPTY, high: Template::EMPTY };
+    pub const EMPTY: Self = Self {
+        blocks: [Block::EMPTY; MAX_KNOTS],
+        counts: [0; BANKS],
+        low: Template::EMPTY,
+        high: Template::EMPTY,
+    };
 }
 
 /// What is found of the pose.
@@ -113,6 +88,8 @@ pub struct Pose {
     harmonic: u32,
     first_harmonic: u32,
     most_harmonic: u32,
+    /// Parts that have a template of their own.
+    sectors: u32,
     walk_px: f32,
     path: Path,
     /// Blocks in a symmetry period, 0 when blocks are whole periods.
@@ -123,7 +100,10 @@ pub struct Pose {
     first_coherence: f32,
     /// Rotor's events in the window.
     events: usize,
-    round: u8,
+    /// Share of them that would be left if all were thinned as the thinnest are: the store keeps dense bursts, and blocks
+    /// beside them hold few events.
+    even_share: f32,
+    started: bool,
     schedule: Schedule,
     /// Segment of the window that is looked at next.
     segment: usize,
@@ -149,6 +129,7 @@ impl Pose {
             harmonic,
             first_harmonic: harmonic,
             most_harmonic: MOST_HARMONIC,
+            sectors: 1,
             walk_px: if parts > 1 { WALK_PX } else { WALK_SINGLE_PX },
             path: Path::STILL,
             in_period: 0,
@@ -156,7 +137,8 @@ impl Pose {
             coherence: 0.0,
             first_coherence: 0.0,
             events: 0,
-            round: 0,
+            even_share: 1.0,
+            started: false,
             schedule: Schedule::NEW,
             segment: 0,
             slope: None,
@@ -170,11 +152,13 @@ impl Pose {
         self
     }
 
-    /// The same for a rotor whose parts differ: the template takes them for one, so that a high harmonic shows their
-    /// differences.
+    /// The same for a rotor of so many parts that differ: each has its own template, on fewer rings.
     #[must_use]
-    pub const fn unlike(mut self) -> Self {
-        self.most_harmonic = 2 * self.harmonic;
+    pub const fn unlike(mut self, parts: u8) -> Self {
+        if parts > 1 {
+            self.sectors = parts as u32;
+            self.walk_px = WALK_PX;
+        }
         self
     }
 
@@ -195,6 +179,34 @@ impl Pose {
     #[must_use]
     pub fn sharpness_px(&self) -> f32 {
         0.5 * self.disc.radius_px / (self.harmonic as f32 * self.coherence.max(LEAST_SHARE))
+    }
+
+    /// The same for those events that kept step when the rotor was found, where a harmonic twice as high or more shows edges
+    /// at all: noise, a lamp and a background among the rotor's events are not blur. Pixels at the rim's half.
+    #[must_use]
+    pub fn blur_px(&self) -> f32 {
+        if self.has_overtone() {
+            self.sharpness_px() * self.first_coherence.max(self.coherence)
+        } else {
+            self.sharpness_px()
+        }
+    }
+
+    /// Blur in pixels half-way to the rim below which edges could not be seen, where parts differ and the harmonic rose as
+    /// far as it may; 0 where it may rise further.
+    #[must_use]
+    pub fn least_blur_px(&self) -> f32 {
+        if self.has_overtone() && self.harmonic == self.most_harmonic {
+            0.5 * self.disc.radius_px / (SEEN_COHERENCE * self.harmonic as f32)
+        } else {
+            0.0
+        }
+    }
+
+    /// Whether twice the harmonic that the rotor was found by keeps step too.
+    #[must_use]
+    pub const fn has_overtone(&self) -> bool {
+        self.harmonic > self.first_harmonic
     }
 
     /// Rotor's events in the window.
@@ -222,13 +234,19 @@ impl Pose {
     }
 
     /// Looks at one more segment of the window, and where that ends a round corrects the path and learns the
-    /// template anew; `true` once all rounds are done. Cost: about 400 instructions an event.
+    /// template anew; `true` once all rounds are done. Cost: about 180 instructions an event.
     pub fn step(&mut self, window: &Window<'_>, sums: &mut Sums) -> bool {
-        if self.round == 0 {
+        if !self.started {
+            self.started = true;
             let disc = Moving::new(self.disc, &self.path, window);
-            self.events = window.events().filter(|event| disc.place(*event).is_some()).count();
-            self.divide(self.blocks().min(FIRST_BLOCKS));
-            self.round = 1;
+            let (mut arrived, mut coarsest) = (0_u64, 0);
+            for event in window.events().filter(|event| disc.place(*event).is_some()) {
+                self.events += 1;
+                arrived += 1 << event.weight_log2();
+                coarsest = coarsest.max(event.weight_log2());
+            }
+            self.even_share = (arrived >> coarsest) as f32 / (self.events as f32).max(1.0);
+            self.divide();
         }
         if self.segment == 0 {
             *sums = Sums::EMPTY;
@@ -239,45 +257,54 @@ impl Pose {
             return false;
         }
         self.segment = 0;
-        let Schedule { second, fine, all, last, .. } = self.schedule;
-        let at_low = sums.low.coherence();
+        self.end_round(sums)
+    }
+
+    /// Corrects the path by what a round saw; `true` when it was the last.
+    fn end_round(&mut self, sums: &mut Sums) -> bool {
+        let fine = self.schedule.is_fine();
+        let at_low = sums.low.coherence(&sums.counts);
         let astray = at_low < SHARP_COHERENCE * self.first_coherence;
-        if self.round > fine && astray && self.harmonic > self.first_harmonic {
+        if fine && astray && self.harmonic > self.first_harmonic {
             self.step_back();
             return false;
         }
         self.sift(sums);
-        if self.round > last {
+        if self.schedule.phase() == Phase::Last {
             self.slope = self.trend(sums);
             let (x_px, y_px) = self.path.centre();
             self.disc.x_px += x_px;
             self.disc.y_px += y_px;
             return true;
         }
-        let at_high = sums.high.coherence();
+        let mut moved_px = f32::MAX;
         if self.phases.is_some() {
-            let (step_px, coherence) = (self.walk_px, self.coherence);
-            let walk = Walk { step_px, coherence, harmonic: self.harmonic };
-            correct(&mut self.path, &sums.blocks, walk);
+            let walk = Walk {
+                step_px: self.walk_px * (self.path.step_us() / WALK_US).max(1.0),
+                coherence: self.coherence,
+                harmonic: self.harmonic,
+                radius_px: self.disc.radius_px,
+            };
+            moved_px = correct(&mut self.path, &sums.blocks, walk).unwrap_or(f32::MAX);
         }
+        let at_high = sums.high.coherence(&sums.counts);
         let worth = at_high > at_low
-            || self.round > fine
-                && at_high > SHARP_COHERENCE * self.first_coherence
-                && 2.0 * at_high > at_low;
-        let sharper = worth && 2 * self.harmonic <= self.most_harmonic;
+            || fine && at_high > SHARP_COHERENCE * self.first_coherence && 2.0 * at_high > at_low;
+        let sharper = worth && self.may_double();
         self.harmonic *= if sharper { 2 } else { 1 };
         self.coherence = if sharper { at_high } else { at_low };
-        if self.round <= fine {
+        if !fine {
             self.first_coherence = self.coherence;
         }
         self.phases = Some(if sharper { &sums.high } else { &sums.low }.phases());
-        self.round += 1;
-        if self.round == second {
-            self.divide(self.blocks().min(SECOND_BLOCKS));
-        } else if self.round == fine || self.round == all {
-            self.divide(self.blocks());
+        if self.schedule.advance(if sharper { f32::MAX } else { moved_px }) {
+            self.divide();
         }
         false
+    }
+
+    const fn may_double(&self) -> bool {
+        2 * self.harmonic <= self.most_harmonic
     }
 
     /// The harmonic was raised too far: half of it, learnt anew, and no higher again.
@@ -286,25 +313,14 @@ impl Pose {
         self.most_harmonic = self.harmonic;
         self.coherence = self.first_coherence;
         self.phases = None;
+        self.schedule.again();
     }
 
-    /// Events that this round looks at, at most.
-    fn most(&self) -> usize {
-        let Schedule { all, first_events, share, most_events, .. } = self.schedule;
-        if self.round < all {
-            first_events
-        } else {
-            (self.events / share).clamp(first_events, most_events)
-        }
-    }
-
-    /// Blocks that so many events are enough for.
-    fn blocks(&self) -> usize {
-        self.events.min(self.most()) / BLOCK_EVENTS
-    }
-
-    /// Lays the path through up to `most` blocks.
-    fn divide(&mut self, most: usize) {
+    /// Lays the path through as many blocks as the phase and the events allow.
+    fn divide(&mut self) {
+        let events = self.events.min(self.schedule.events(self.events));
+        let even = (events as f32 * self.even_share) as usize;
+        let most = (even / BLOCK_EVENTS).min(self.schedule.blocks());
         let most = most.clamp(4, MAX_KNOTS - 1) as f32;
         let shortest = (self.window_us / most).max(SHORTEST_BLOCK_US);
         let split = libm::floorf((self.period_us / shortest).min(MOST_IN_PERIOD));
@@ -321,33 +337,33 @@ impl Pose {
     /// Looks at the events of a segment: how far the blocks are off the template, and the templates of this harmonic
     /// and of twice it. Early rounds look at some events only.
     fn look(&self, window: &Window<'_>, sums: &mut Sums) {
-        let stride = self.events.div_ceil(self.most()).max(1);
+        let stride = self.events.div_ceil(self.schedule.events(self.events)).max(1);
         let disc = Moving::new(self.disc, &self.path, window);
         let rate = TurnRate::from_rad_s(self.omega_rad_s);
-        let rings_per_px = RINGS as f32 / self.disc.radius_px.max(1.0);
-        let m = self.harmonic as f32;
-        let phases = self.phases.as_ref();
+        let rings = (RINGS / self.sectors as usize).max(1);
+        let rings_per_px = rings as f32 / self.disc.radius_px.max(1.0);
+        let doubles = self.may_double();
         for event in window.segment(self.segment).iter().step_by(stride) {
-            let Some((x_px, y_px, r2)) = disc.place(*event) else { continue };
             let t_us = disc.since_middle_us(*event);
-            let turn = Turn::from_rad(self.path.at(t_us as f32).turn_rad).plus(rate.after(t_us));
-            let angle = Turn::of_vector(y_px, x_px);
-            let (s, c) = angle.minus(turn).times(self.harmonic).sin_cos();
-            let radius_px = sqrt(r2);
-            let ring = ((radius_px * rings_per_px) as usize).min(RINGS - 1);
-            let bank = 2 * ring + usize::from(event.is_on());
-            sums.low.add(bank, (s, c));
-            sums.high.add(bank, (2.0 * s * c, c * c - s * s));
-            let Some(phases) = phases else { continue };
-            let (re, im) = phases[bank];
-            let (sin_psi, cos_psi) = (s * re - c * im, c * re + s * im);
-            let lever = m / r2;
             let (index, f) = self.path.place(t_us as f32);
-            sums.blocks[index].add(
-                Vector3::new(m, -y_px * lever, x_px * lever),
-                (sin_psi, cos_psi),
-                (t_us as f32, f),
-            );
+            let knot = self.path.between((index, f));
+            let Some((x_px, y_px, r2)) = disc.place_by(*event, knot) else { continue };
+            let turn = Turn::from_rad(knot.turn_rad).plus(rate.after(t_us));
+            let angle = Turn::of_vector(y_px, x_px).minus(turn);
+            let (s, c) = angle.times(self.harmonic).sin_cos();
+            let ring = ((quick_sqrt(r2) * rings_per_px) as usize).min(rings - 1);
+            let sector = angle.sector(self.sectors) as usize;
+            let bank = (2 * (sector * rings + ring) + usize::from(event.is_on())).min(BANKS - 1);
+            sums.counts[bank] += 1;
+            sums.low.add(bank, (s, c));
+            if doubles {
+                sums.high.add(bank, (2.0 * s * c, c * c - s * s));
+            }
+            let Some(phases) = &self.phases else { continue };
+            let (re, im) = phases[bank];
+            let off = (s * re - c * im, c * re + s * im);
+            let per_r2 = 1.0 / r2;
+            sums.blocks[index].add((-y_px * per_r2, x_px * per_r2), off, (t_us as f32, f));
         }
     }
 
@@ -370,7 +386,7 @@ impl Pose {
         let mut points = Vec::<Point, MAX_KNOTS>::new();
         for block in sums.blocks.iter().take(count) {
             let t_us = block.middle_us();
-            let (off_rad, weight) = block.turn_rad().unwrap_or_default();
+            let (off_rad, weight) = block.turn_rad(self.harmonic as f32).unwrap_or_default();
             let y = self.path.at(t_us).turn_rad + off_rad;
             points.push(Point { u: t_us / half_us, y, weight }).ok();
         }

@@ -14,6 +14,8 @@ const MOST_DEGREE: usize = 16;
 /// A further degree must lower twice the negative logarithm of the likelihood by this: twice what Schwarz's criterion asks for
 /// the number of points here, because each degree multiplies the variance of the ends.
 const DEGREE_COST: f32 = 8.0;
+/// So many further degrees in vain are the last.
+const IN_VAIN: usize = 4;
 /// What is left of a polynomial beside those before, below which it says nothing new.
 const LEAST_REST: f32 = 1e-3;
 
@@ -78,7 +80,7 @@ impl Points<'_> {
 
 impl Trend {
     /// Fits a trend, with an offset of its own for every `fold`-th point: points i and i + fold share one. `None` when
-    /// too few points are left. At most [`MOST_POINTS`] count. Cost: about 20 instructions a point and degree squared.
+    /// too few points are left. At most [`MOST_POINTS`] count. Cost: about 10 instructions a point and degree squared.
     #[must_use]
     pub fn fit(points: &[Point], fold: usize) -> Option<Self> {
         let points = &points[..points.len().min(MOST_POINTS)];
@@ -141,6 +143,8 @@ impl Trend {
             // A parabola always: its bend is asked for.
             if degree <= 2 || best.is_none_or(|(least, _)| cost < least) {
                 best = Some((cost, found));
+            } else if best.is_some_and(|(_, best)| degree >= best.degree + IN_VAIN) {
+                break;
             }
         }
         best.map(|(_, found)| found).filter(|found| found.degree >= 2)

@@ -4,10 +4,10 @@ use super::event::MOST_WEIGHT_LOG2;
 use super::{Store, StoredEvent};
 use crate::event::PackedEvent;
 
-/// Eighths of a segment that keep consecutive events.
-const DENSE_EIGHTHS: usize = 2;
-/// Eighths before the reservoir starts.
-const BURST_EIGHTHS: usize = 5;
+/// Sixteenths of a segment that keep consecutive events.
+const DENSE_SIXTEENTHS: usize = 4;
+/// Sixteenths before the reservoir starts.
+const BURST_SIXTEENTHS: usize = 7;
 
 /// What is known of a segment beside its events.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +32,7 @@ pub(super) struct Segment {
 impl Default for Segment {
     fn default() -> Self {
         // Where the octaves end, the reservoir goes on as densely as the last of them.
-        let stride_log2 = (BURST_EIGHTHS - DENSE_EIGHTHS) as u8;
+        let stride_log2 = (BURST_SIXTEENTHS - DENSE_SIXTEENTHS) as u8;
         Self {
             len: 0,
             counted: 0,
@@ -84,7 +84,7 @@ impl Store<'_> {
     /// Chooses how many events the next ones stand for, and up to where; a full segment makes room first.
     #[cold]
     fn turn(&mut self, slot: usize) {
-        let (base, burst, octave) = (slot * self.capacity, self.burst(), self.capacity / 8);
+        let (base, burst, octave) = (slot * self.capacity, self.burst(), self.capacity / 16);
         let segment = &mut self.segments[slot];
         if segment.len == self.capacity {
             // Halve the reservoir: every other event goes, those kept stay evenly spread.
@@ -97,13 +97,13 @@ impl Store<'_> {
                 reservoir[i] = reservoir[2 * i].weighing(segment.stride_log2);
             }
         }
-        let eighth = segment.len.checked_div(octave).unwrap_or(0);
+        let part = segment.len.checked_div(octave).unwrap_or(0);
         (segment.step_log2, segment.until) = if octave == 0 {
             (0, self.capacity)
-        } else if eighth < DENSE_EIGHTHS {
-            (0, DENSE_EIGHTHS * octave)
-        } else if eighth < BURST_EIGHTHS {
-            ((eighth - DENSE_EIGHTHS + 1) as u8, (eighth + 1) * octave)
+        } else if part < DENSE_SIXTEENTHS {
+            (0, DENSE_SIXTEENTHS * octave)
+        } else if part < BURST_SIXTEENTHS {
+            ((part - DENSE_SIXTEENTHS + 1) as u8, (part + 1) * octave)
         } else {
             (segment.stride_log2, self.capacity)
         };
@@ -111,6 +111,6 @@ impl Store<'_> {
 
     /// Events of a segment that come before its reservoir.
     pub(super) const fn burst(&self) -> usize {
-        BURST_EIGHTHS * (self.capacity / 8)
+        BURST_SIXTEENTHS * (self.capacity / 16)
     }
 }

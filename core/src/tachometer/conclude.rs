@@ -4,6 +4,7 @@ use heapless::Vec;
 
 use super::{BASE_WINDOW_US, Job, LONGEST_WINDOW_US, Tachometer, segment_us};
 use crate::limits::MAX_ROTORS;
+use crate::order::sort_few;
 use crate::reading::{Evidence, Frame, Reading, Reason, RotorReading, Status};
 use crate::rotors::Disc;
 use crate::speed::measurement::Outcome;
@@ -23,6 +24,8 @@ const WINDOWS_US: [u32; 9] = [
 ];
 /// Segments by which the window moves on from reading to reading: 50 ms of 150.
 const HOP_SEGMENTS: usize = 2;
+/// Readings until the whole image is searched again, while a rotor is in view that is not locked.
+const SEARCH_AGAIN: u8 = 2;
 /// Fewest events in a window that are looked at.
 const LEAST_EVENTS: u64 = 300;
 /// Share of events lost beyond which the rest is not trusted.
@@ -45,7 +48,7 @@ impl Tachometer<'_> {
             let id = self.tracker.identify(outcome);
             rotors.push(rotor_reading(id, outcome, account.roll_rad_s())).ok();
         }
-        rotors.sort_unstable_by_key(|rotor| rotor.id);
+        sort_few(&mut rotors, |a, b| a.id < b.id);
         let lost =
             account.lost as f32 > MOST_LOST * account.counted.saturating_add(account.lost) as f32;
         let status = if account.counted == 0 {
@@ -74,6 +77,9 @@ impl Tachometer<'_> {
         self.window_segments = 0;
         self.job = Job::Idle;
         self.satisfied = status == Status::Locked;
+        if self.outcomes.iter().any(|outcome| outcome.status != Status::Locked) {
+            self.until_search = self.until_search.min(SEARCH_AGAIN);
+        }
         if self.overrun {
             // There is a hole behind what is stored. What is known of the rotors still holds.
             let until_search = self.until_search;
@@ -90,6 +96,8 @@ impl Tachometer<'_> {
             let longer = WINDOWS_US.iter().find(|w| **w as f32 >= wanted);
             self.target_us = longer.copied().unwrap_or(LONGEST_WINDOW_US);
             self.store.lengthen(segment_us(self.target_us));
+            // It is longer for a rotor that is not locked, and only those are followed.
+            self.until_search = 0;
         } else if status.reason().is_some() && adapts {
             // Nothing even in the longest window: begin again with a short one.
             self.restart(self.last_us);

@@ -4,11 +4,13 @@
 //! all that is asked here, of many at once; what else an event may be is told elsewhere, one by one.
 
 use crate::event::{Geometry, PackedEvent};
-use crate::rotors::heat::Counter;
 use crate::settings::Settings;
 
 /// Upper bits of column and row, which no pixel on a sensor has: where they end up set, a subtraction has borrowed.
 const BORROWED: u32 = 0x8000_8000;
+
+/// A power of two: steps below it add up without overflow, four at a time.
+const FAR_US: u32 = 1 << 28;
 
 /// What an event must be to pass.
 #[derive(Clone, Copy, Debug)]
@@ -59,49 +61,45 @@ impl Gate {
         self.low_us.wrapping_sub(low_us)
     }
 
-    /// Lets events pass up to the first that is not in time or not in view, and counts them in the heat map; returns how many.
+    /// Lets events pass up to the first that is not in time or not in view, and returns how many.
     // A function of its own, so that all it needs stays in registers.
     #[inline(never)]
-    pub fn admit(&mut self, events: &[PackedEvent], heat: &mut Counter<'_>) -> usize {
-        self.admit_each(events, |x, y| heat.add(x, y))
-    }
-
-    /// The same for events that are not to be counted.
-    #[inline(never)]
-    pub fn admit_uncounted(&mut self, events: &[PackedEvent]) -> usize {
-        self.admit_each(events, |_, _| ())
-    }
-
-    #[inline(always)]
-    fn admit_each(&mut self, events: &[PackedEvent], mut passed: impl FnMut(u32, u32)) -> usize {
-        let Self { mut low_us, mut left_us, .. } = *self;
-        let mut rest = events.iter();
-        let mut stopped = 0;
-        for event in rest.by_ref() {
-            // A step back is a large one.
-            let step_us = event.low_us().wrapping_sub(low_us);
-            if step_us >= left_us || self.is_outside(event.pixel()) {
-                stopped = 1;
+    pub fn admit(&mut self, events: &[PackedEvent]) -> usize {
+        let Self { mut low_us, mut left_us, origin, span, .. } = *self;
+        let mut passed = 0;
+        // Four share their questions: where none steps far, none steps back, and the last is the latest.
+        for four in events.as_chunks::<4>().0 {
+            let (mut before_us, mut steps, mut inside) = (low_us, 0, BORROWED);
+            for event in four {
+                steps |= event.low_us().wrapping_sub(before_us);
+                before_us = event.low_us();
+                inside &= kept_borrowed(event.pixel(), origin, span);
+            }
+            let step_us = before_us.wrapping_sub(low_us);
+            if steps >= FAR_US || step_us >= left_us || inside != BORROWED {
                 break;
             }
-            left_us -= step_us;
-            low_us = event.low_us();
-            passed(event.pixel() & 0xffff, event.pixel() >> 16);
+            (low_us, left_us) = (before_us, left_us - step_us);
+            passed += 4;
+        }
+        for event in &events[passed..] {
+            let step_us = event.low_us().wrapping_sub(low_us);
+            if step_us >= left_us || is_outside(event.pixel(), origin, span) {
+                break;
+            }
+            (low_us, left_us) = (event.low_us(), left_us - step_us);
+            passed += 1;
         }
         (self.low_us, self.left_us) = (low_us, left_us);
-        events.len() - rest.len() - stopped
-    }
-
-    #[inline(always)]
-    const fn is_outside(&self, pixel: u32) -> bool {
-        let from_origin = pixel.wrapping_sub(self.origin);
-        self.span.wrapping_sub(from_origin) & !from_origin & BORROWED != BORROWED
+        passed
     }
 
     /// Where an event lies that is in time but not in view.
     pub const fn outside(&self, event: PackedEvent) -> Option<Outside> {
         let pixel = event.pixel();
-        if event.low_us().wrapping_sub(self.low_us) >= self.left_us || !self.is_outside(pixel) {
+        if event.low_us().wrapping_sub(self.low_us) >= self.left_us
+            || !is_outside(pixel, self.origin, self.span)
+        {
             None
         } else if self.sensor.contains(pixel as u16, (pixel >> 16) as u16) {
             Some(Outside::Roi)
@@ -109,4 +107,16 @@ impl Gate {
             Some(Outside::Sensor)
         }
     }
+}
+
+/// Has all bits of [`BORROWED`] when a pixel is in view.
+#[inline(always)]
+const fn kept_borrowed(pixel: u32, origin: u32, span: u32) -> u32 {
+    let from_origin = pixel.wrapping_sub(origin);
+    span.wrapping_sub(from_origin) & !from_origin
+}
+
+#[inline(always)]
+const fn is_outside(pixel: u32, origin: u32, span: u32) -> bool {
+    kept_borrowed(pixel, origin, span) & BORROWED != BORROWED
 }

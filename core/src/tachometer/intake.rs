@@ -65,20 +65,17 @@ impl Tachometer<'_> {
         }
         let gate = Gate::new(&self.settings, self.last_us, end_us.min(LATEST_US + 1));
         let Some(mut gate) = gate else { return 0 };
-        let mut heat = self.heat.counter();
         let mut taken = 0;
         loop {
             let rest = &events[taken..];
-            let passed = if self.overrun {
-                let passed = gate.admit_uncounted(rest);
-                self.ignored.overrun += passed as u64;
-                passed
+            let passed = &rest[..gate.admit(rest)];
+            if self.overrun {
+                self.ignored.overrun += passed.len() as u64;
             } else {
-                let passed = gate.admit(rest, &mut heat);
-                self.store.push(&rest[..passed]);
-                passed
-            };
-            taken += passed;
+                self.heat.add(passed);
+                self.store.push(passed);
+            }
+            taken += passed.len();
             let Some(stopped) = events.get(taken) else { break };
             match gate.outside(*stopped) {
                 Some(Outside::Sensor) => self.ignored.out_of_bounds += 1,
@@ -126,8 +123,9 @@ impl Tachometer<'_> {
             self.ignored.overrun += 1;
             return;
         }
-        self.heat.counter().add(event.x.into(), event.y.into());
-        self.store.push(&[PackedEvent::pack(event)]);
+        let packed = [PackedEvent::pack(event)];
+        self.heat.add(&packed);
+        self.store.push(&packed);
     }
 
     /// Forgets the window; rotors keep their letters.

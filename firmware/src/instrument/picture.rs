@@ -88,7 +88,7 @@ fn hot(counts: &[u16]) -> u16 {
 
 #[cfg(test)]
 mod tests {
-    use evtach_core::Geometry;
+    use evtach_core::{Geometry, PackedEvent, Polarity};
 
     use super::*;
 
@@ -98,13 +98,14 @@ mod tests {
         let mut heat = HeatMap::new(&mut counts, Geometry { width_px: 40, height_px: 80 });
         for (x, events) in [(0, 10), (4, 100), (8, 200), (12, 60_000)] {
             for _ in 0..events {
-                heat.counter().add(x, 8);
+                heat.add(&[PackedEvent::new(0, x, 8, Polarity::On)]);
             }
         }
         // A rotor, beside which the hot pixel is one cell in a hundred.
-        for cell in 0..100 {
+        for cell in 0..100_u16 {
             for _ in 0..200 {
-                heat.counter().add(cell % 10 * 4, 40 + cell / 10 * 4);
+                let (x, y) = (cell % 10 * 4, 40 + cell / 10 * 4);
+                heat.add(&[PackedEvent::new(0, x, y, Polarity::On)]);
             }
         }
         let mut picture = Picture::EMPTY;

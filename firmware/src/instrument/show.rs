@@ -16,6 +16,9 @@ const SILENT_US: u64 = 500_000;
 /// A reading older than this says nothing about the present.
 const OLD_READING_US: u64 = 3_000_000;
 
+/// With more events lost than this and no new reading, that is why.
+const MOST_LOST_PERMILLE: u16 = 500;
+
 impl Instrument {
     /// What is to be shown now.
     #[must_use]
@@ -108,14 +111,16 @@ impl Instrument {
     /// Why there is no speed of the rotor shown.
     fn refusal(&self, scene: &Scene) -> Reason {
         let age_us = |reading| scene.now_us.saturating_sub(end_us(reading));
+        let mostly_lost = self.meter.rate.lost_permille > MOST_LOST_PERMILLE;
+        let waiting = if mostly_lost { Reason::Saturated } else { Reason::Searching };
         let Some(latest) = self.latest.as_ref().filter(|latest| age_us(latest) <= OLD_READING_US)
         else {
-            return Reason::Searching;
+            return waiting;
         };
         let shown = latest.rotors.iter().find(|rotor| Some(rotor.id) == self.selected);
         match shown {
             // A speed, but too old: the next reading takes its time.
-            Some(rotor) => rotor.status.reason().unwrap_or(Reason::Searching),
+            Some(rotor) => rotor.status.reason().unwrap_or(waiting),
             // Other rotors may have a speed, but this one has gone.
             None => latest.status.reason().unwrap_or(Reason::NoRotation),
         }

@@ -1,7 +1,7 @@
 //! How many events arrive.
 
-/// Events a second from which on the device can no longer use them all: at 110 instructions an event, taking them in
-/// alone fills 160 of the processor's 216 million instructions.
+/// Events a second from which on the device can no longer use them all: at 94 instructions an event, reading them and taking
+/// them in alone fills 140 of the processor's 216 million instructions.
 pub const SATURATION_EV_S: u32 = 1_500_000;
 
 /// Shortest time over which a rate is told, in microseconds.
@@ -11,9 +11,9 @@ const RATE_US: u64 = 100_000;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Traffic {
-    /// Events that arrived.
+    /// Events that arrived and found room.
     pub events: u64,
-    /// Events that the sensor or the link lost, or that found no room.
+    /// Events that the sensor or the link lost, or that found no room: none of those above.
     pub lost: u64,
 }
 
@@ -33,7 +33,7 @@ pub(super) struct Meter {
     from_us: Option<u64>,
     from: Traffic,
     last: Traffic,
-    /// When the last event was seen to have arrived.
+    /// When the sensor was last seen to have sent an event, lost or not.
     pub last_event_us: Option<u64>,
     pub rate: Rate,
 }
@@ -49,7 +49,7 @@ impl Meter {
 
     /// Takes in the counts at a time.
     pub fn update(&mut self, now_us: u64, traffic: Traffic) {
-        if traffic.events != self.last.events {
+        if traffic != self.last {
             self.last_event_us = Some(now_us);
         }
         self.last = traffic;

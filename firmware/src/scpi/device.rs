@@ -1,8 +1,10 @@
 //! What the link needs of the rest of the device.
 
+use embedded_storage::Storage;
 use evtach_core::{Geometry, Reading, Reason, Roi};
 
 use crate::instrument::{Fault, Preferences, Sensor};
+use crate::recorder::Recorder;
 use crate::sensor::usb::Trouble;
 
 /// What `*IDN?` answers, and nothing that a comma could split.
@@ -59,6 +61,19 @@ pub struct RecorderStatus {
     pub events: u32,
     /// Events it has room for.
     pub capacity: u32,
+}
+
+impl<M: Storage> From<&Recorder<M>> for RecorderStatus {
+    fn from(recorder: &Recorder<M>) -> Self {
+        let state = if recorder.is_running() {
+            RecorderState::Running
+        } else if recorder.is_full() {
+            RecorderState::Full
+        } else {
+            RecorderState::Idle
+        };
+        Self { state, events: recorder.events(), capacity: recorder.capacity() }
+    }
 }
 
 /// The memory of the recorder failed.

@@ -18,7 +18,7 @@ pub struct Standing {
     pub trouble: Option<usb::Trouble>,
     /// Sensor time that has been reached, in microseconds.
     pub latest_us: u64,
-    /// Events that came.
+    /// Events that came, and found room.
     pub received: u64,
     /// Events that the sensor or the link lost, or that found no room.
     pub lost: u64,
@@ -37,7 +37,7 @@ impl From<&spi::Acquired> for Standing {
             geometry: sensor.map(|hello| hello.geometry),
             trouble: None,
             latest_us: *latest_us,
-            received: account.received,
+            received: account.received.saturating_sub(*overrun),
             lost: account.lost.total().saturating_add(*overrun),
         }
     }
@@ -50,7 +50,7 @@ impl From<&usb::Acquired> for Standing {
             geometry: camera.map(|camera| camera.geometry),
             trouble: *trouble,
             latest_us: *latest_us,
-            received: delivered.received,
+            received: delivered.received.saturating_sub(delivered.overrun),
             lost: delivered.overrun.saturating_add(*lost_by_camera),
         }
     }

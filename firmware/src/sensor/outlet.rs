@@ -4,7 +4,7 @@ use core::mem;
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_sync::zerocopy_channel::Sender;
-use evtach_core::{Event, Geometry, GyroSample, PackedEvent};
+use evtach_core::{Geometry, GyroSample, PackedEvent};
 
 use crate::intake::{BLOCKS, Block};
 
@@ -16,16 +16,26 @@ const RELAXED: usize = BLOCKS / 2;
 /// Thinnest: one event in 16.
 const MOST_STRIDE_LOG2: u32 = 4;
 
-/// Words that a sensor sent, decoded one by one.
-pub(crate) trait Words {
-    /// Most events that one of these words stands for.
-    fn most_events_a_word(&self) -> usize;
+/// Most events that one word of any sensor stands for: an EVT 3 vector.
+const MOST_EVENTS_A_WORD: usize = 12;
 
+/// Words that a sensor sent.
+pub(crate) trait Words {
     /// Whether every word has been decoded.
     fn is_done(&self) -> bool;
 
-    /// Decodes at most `words` words and hands out their events; stops early behind a gyro sample.
-    fn decode(&mut self, words: usize, emit: impl FnMut(Event)) -> Option<GyroSample>;
+    /// Decodes words into a space, until either is used up as far as words cannot overfill it, or a gyro sample comes.
+    fn fill(&mut self, space: &mut [PackedEvent]) -> Filled;
+}
+
+/// What came of words.
+pub(crate) struct Filled {
+    /// Events.
+    pub events: usize,
+    /// A time in microseconds within half an hour of the first: packed events tell its low half only.
+    pub near_us: u64,
+    /// What the gyro said behind them.
+    pub sample: Option<GyroSample>,
 }
 
 /// What became of the events that came.
@@ -82,8 +92,9 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
             };
             let Some(slot) = slot else {
                 let before = events;
+                let mut nowhere = [PackedEvent::ZERO; 2 * MOST_EVENTS_A_WORD];
                 while !words.is_done() {
-                    words.decode(usize::MAX, |_| events += 1);
+                    events += words.fill(&mut nowhere).events as u32;
                 }
                 self.delivered.overrun += u64::from(events - before);
                 self.lost += u64::from(events - before);
@@ -91,10 +102,14 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
             };
             slot.clear();
             while !words.is_done() && !slot.gyro.is_full() {
-                if slot.space().len() < words.most_events_a_word() {
+                if slot.space().len() < MOST_EVENTS_A_WORD {
                     break;
                 }
-                let Some((count, first_us)) = fill(&mut words, slot) else { continue };
+                let Filled { events: count, near_us, sample } = words.fill(slot.space());
+                slot.filled(count);
+                if let Some(sample) = sample {
+                    slot.gyro.push(sample).ok();
+                }
                 events += count as u32;
                 let before = slot.events().len() - count;
                 if self.stride_log2 > 0 {
@@ -109,7 +124,7 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
                 if before == 0
                     && let Some(first) = slot.events().first()
                 {
-                    slot.t_us = first.unpack(first_us).t_us;
+                    slot.t_us = first.unpack(near_us).t_us;
                 }
             }
             if !slot.is_empty() {
@@ -140,27 +155,4 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
         slot.last = true;
         self.blocks.send_done();
     }
-}
-
-/// Fills the space of a block, as far as words cannot overfill it; returns how many events came, and the time of
-/// the first in microseconds; `None` when none did.
-fn fill(words: &mut impl Words, block: &mut Block) -> Option<(usize, u64)> {
-    let most = words.most_events_a_word();
-    let space = block.space();
-    let (room, mut first_us) = (space.len(), None);
-    let mut places = space.iter_mut();
-    let sample = words.decode(room / most, |event| {
-        if first_us.is_none() {
-            first_us = Some(event.t_us);
-        }
-        if let Some(place) = places.next() {
-            *place = PackedEvent::pack(&event);
-        }
-    });
-    let count = room - places.len();
-    block.filled(count);
-    if let Some(sample) = sample {
-        block.gyro.push(sample).ok();
-    }
-    first_us.map(|first_us| (count, first_us))
 }

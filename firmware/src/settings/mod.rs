@@ -47,6 +47,11 @@ impl<F: NorFlash> Store<F> {
         Self { flash, start, end }
     }
 
+    /// Gives the flash back.
+    pub fn release(self) -> F {
+        self.flash
+    }
+
     /// What was saved last. [`Fault::Preferences`] beside the defaults when something is there that cannot be read.
     pub async fn load(&mut self) -> (Preferences, Option<Fault>) {
         match self.try_load().await {

@@ -6,12 +6,14 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, bail};
-use evtach_core::{Event, Geometry, GyroSample, Reading, Roi, Settings};
+use evtach_core::{Event, GyroSample, Reading};
 use evtach_host::measure::{
-    Capacity, Document, FileFacts, drain, evidence, feed, summarise, table, with_tachometer,
+    Document, FileFacts, drain, evidence, feed, summarise, table, with_tachometer,
 };
-use evtach_host::recording::{self, ImuSample, OpenOptions};
+use evtach_host::recording::ImuSample;
 use indicatif::{ProgressBar, ProgressStyle};
+
+use super::how::How;
 
 /// Arguments of `evtach measure`.
 #[derive(clap::Args)]
@@ -22,30 +24,14 @@ pub struct Args {
     /// One JSON document per file instead of a table.
     #[arg(long)]
     json: bool,
-    /// Blade count, when it is known.
-    #[arg(long, value_parser = clap::value_parser!(u8).range(1..=64))]
-    blades: Option<u8>,
-    /// Look at this part of the sensor only, in pixels.
-    #[arg(long, value_name = "X,Y,W,H", value_parser = parse_roi)]
-    roi: Option<Roi>,
+    #[command(flatten)]
+    how: How,
     /// Start this many seconds after the first event.
     #[arg(long, value_name = "SECONDS")]
     start: Option<f64>,
     /// End this many seconds after the first event.
     #[arg(long, value_name = "SECONDS")]
     end: Option<f64>,
-    /// Fixed window instead of one that adapts to the rotor.
-    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(5..=2000))]
-    window_ms: Option<u32>,
-    /// Size of the sensor, where the recording does not say it or says it wrong.
-    #[arg(long, value_name = "WxH", value_parser = recording::parse_geometry)]
-    geometry: Option<Geometry>,
-    /// Memory of the tachometer: "device" gives what the device shows, to the bit.
-    #[arg(long, value_enum, default_value = "full")]
-    capacity: Capacity,
-    /// One standard deviation of the camera clock's error.
-    #[arg(long, value_name = "PPM", default_value_t = 15.0)]
-    clock_ppm: f32,
     /// Take the camera's own roll out of the speed by the recording's gyro, where it has one.
     ///
     /// The gyro's offset should have been calibrated away; its axes are those of the cameras' documentation, not yet
@@ -55,16 +41,6 @@ pub struct Args {
     /// Show what each stage found, and why something was refused.
     #[arg(short, long)]
     verbose: bool,
-}
-
-fn parse_roi(text: &str) -> Result<Roi, String> {
-    let fields: Vec<u16> = text.split(',').filter_map(|field| field.trim().parse().ok()).collect();
-    match fields[..] {
-        [x, y, width_px, height_px] if width_px > 0 && height_px > 0 => {
-            Ok(Roi { x, y, width_px, height_px })
-        }
-        _ => Err(format!("\"{text}\" is no region; write x,y,width,height in pixels")),
-    }
 }
 
 /// Runs the subcommand.
@@ -85,16 +61,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 /// Measures one file; whether it has a speed.
 fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
     let name = file.display().to_string();
-    let options = OpenOptions { geometry: args.geometry };
-    let mut recording = recording::open(file, &options).with_context(|| name.clone())?;
-    for assumed in &recording.assumed {
-        eprintln!("{name}: {assumed}");
-    }
-    let mut settings = Settings::new(recording.geometry);
-    settings.roi = args.roi;
-    settings.blades = args.blades;
-    settings.window_us = args.window_ms.map(|ms| ms * 1000);
-    settings.clock_sigma_ppm = args.clock_ppm;
+    let mut recording = args.how.open(file)?;
+    let settings = args.how.settings(recording.geometry);
 
     let bar = ProgressBar::new_spinner();
     if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {human_pos} events, {per_sec}")
@@ -110,7 +78,7 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
     };
     let mut readings: Vec<Reading> = Vec::new();
     let mut failure = None;
-    let ignored = with_tachometer(settings, args.capacity, |tachometer| {
+    let ignored = with_tachometer(settings, args.how.capacity, |tachometer| {
         let mut chunk: Vec<Event> = Vec::new();
         let mut rolls: Vec<GyroSample> = Vec::new();
         let mut origin_us = None;
@@ -166,7 +134,8 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
             "{name}: the recording holds no events; record again, or check the format with `evtach info`"
         );
     }
-    if readings.is_empty() && (args.start.is_some() || args.end.is_some() || args.roi.is_some()) {
+    if readings.is_empty() && (args.start.is_some() || args.end.is_some() || args.how.roi.is_some())
+    {
         bail!("{name}: no events between --start and --end inside --roi; widen them");
     }
     for note in &recording.side().notes {
@@ -182,8 +151,7 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
         eprintln!("{name}: {} events stepped back in time and were left out", ignored.out_of_order);
     }
     facts.lost = recording.lost();
-    let middle_us = facts.first_us + facts.last_us.saturating_sub(facts.first_us) / 2;
-    let summary = summarise(&readings, middle_us, args.clock_ppm);
+    let summary = summarise(&readings, &(facts.first_us..facts.last_us), args.how.clock_ppm);
     if args.json {
         println!("{}", serde_json::to_string(&Document::new(&facts, &summary, &readings))?);
     } else {

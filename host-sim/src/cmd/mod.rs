@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod convert;
+mod how;
 pub mod info;
 pub mod measure;
 pub mod plot;

@@ -4,10 +4,12 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, bail};
-use evtach_core::{Event, Geometry, GyroSample, Settings};
-use evtach_host::measure::{Capacity, FileFacts, measure_events, summarise};
-use evtach_host::recording::{self, ImuSample, OpenOptions};
+use evtach_core::{Event, GyroSample};
+use evtach_host::measure::{FileFacts, measure_events, summarise};
+use evtach_host::recording::ImuSample;
 use evtach_host::report::{Subject, heat_map, html};
+
+use super::how::How;
 
 /// Arguments of `evtach plot`.
 #[derive(clap::Args)]
@@ -17,22 +19,9 @@ pub struct Args {
     /// Report to write [default: the recording's name with .html]; a name in .svg gets the heat map alone.
     #[arg(short, long, value_name = "HTML|SVG")]
     out: Option<PathBuf>,
-    /// Blade count, when it is known.
-    #[arg(long, value_parser = clap::value_parser!(u8).range(1..=64))]
-    blades: Option<u8>,
-    /// Fixed window instead of one that adapts to the rotor.
-    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(5..=2000))]
-    window_ms: Option<u32>,
-    /// Size of the sensor, where the recording does not say it or says it wrong.
-    #[arg(long, value_name = "WxH", value_parser = recording::parse_geometry)]
-    geometry: Option<Geometry>,
-    /// Memory of the tachometer.
-    #[arg(long, value_enum, default_value = "full")]
-    capacity: Capacity,
+    #[command(flatten)]
+    how: How,
 }
-
-/// One standard deviation of the camera clock's error in ppm, as `measure` assumes it.
-const CLOCK_SIGMA_PPM: f32 = 15.0;
 
 /// Runs the subcommand.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
@@ -42,8 +31,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         None if args.file == Path::new("-") => bail!("stdin has no name: say where to with --out"),
         None => args.file.with_extension("html"),
     };
-    let mut recording = recording::open(&args.file, &OpenOptions { geometry: args.geometry })
-        .with_context(|| name.clone())?;
+    let mut recording = args.how.open(&args.file)?;
     let mut events: Vec<Event> = Vec::new();
     let mut gyro: Vec<GyroSample> = Vec::new();
     loop {
@@ -66,13 +54,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         );
     };
     let (first_us, last_us) = (first.t_us, last.t_us);
-    let mut settings = Settings::new(recording.geometry);
-    settings.blades = args.blades;
-    settings.window_us = args.window_ms.map(|ms| ms * 1000);
-    settings.clock_sigma_ppm = CLOCK_SIGMA_PPM;
-    let (readings, _) = measure_events(&events, &gyro, settings, args.capacity);
-    let summary =
-        summarise(&readings, first_us + last_us.saturating_sub(first_us) / 2, CLOCK_SIGMA_PPM);
+    let settings = args.how.settings(recording.geometry);
+    let (readings, _) = measure_events(&events, &gyro, settings, args.how.capacity);
+    let summary = summarise(&readings, &(first_us..last_us), args.how.clock_ppm);
     let facts = FileFacts {
         file: name,
         format: recording.format.to_owned(),

@@ -1,14 +1,16 @@
 //! The reading over a whole recording, from the series.
 
-use evtach_core::{Reading, Reason, RotorReading, Speed, Status};
+use std::ops::Range;
+
+use evtach_core::{Reading, Reason, RotorReading, Status};
+
+use super::mean::{Piece, mean_speed};
 
 /// A rotor must be measured in this share of the readings that the most seen one is measured in, else it
 /// stands in the series only.
 const LEAST_SHARE: f64 = 0.25;
 /// The same for a rotor that was found but never measured, among all readings.
 const LEAST_SHARE_REFUSED: f64 = 0.5;
-/// Readings follow each other by a third of a window: every third is independent.
-const OVERLAP: f64 = 3.0;
 
 /// The reading over a whole recording.
 #[derive(Clone, Debug)]
@@ -19,9 +21,9 @@ pub struct Summary {
     pub rotors: Vec<RotorReading>,
 }
 
-/// Sums up a series; `middle_us` is the middle of the recording in sensor time.
+/// Sums up a series; `span_us` is from the first event of the recording to the last, in sensor time.
 #[must_use]
-pub fn summarise(readings: &[Reading], middle_us: u64, clock_sigma_ppm: f32) -> Summary {
+pub fn summarise(readings: &[Reading], span_us: &Range<u64>, clock_sigma_ppm: f32) -> Summary {
     let mut ids: Vec<u8> = readings.iter().flat_map(|r| r.rotors.iter().map(|r| r.id)).collect();
     ids.sort_unstable();
     ids.dedup();
@@ -39,7 +41,7 @@ pub fn summarise(readings: &[Reading], middle_us: u64, clock_sigma_ppm: f32) -> 
                 rows(readings, **id).count() as f64 >= LEAST_SHARE_REFUSED * readings.len() as f64
             }
         })
-        .filter_map(|id| over_recording(readings, *id, middle_us, clock_sigma_ppm))
+        .filter_map(|id| over_recording(readings, *id, span_us, clock_sigma_ppm))
         .collect();
     let has = |status: Status| rotors.iter().any(|rotor| rotor.status == status);
     let status = if has(Status::Locked) {
@@ -71,14 +73,19 @@ fn refusal(readings: &[Reading]) -> Status {
 fn over_recording(
     readings: &[Reading],
     id: u8,
-    middle_us: u64,
+    span_us: &Range<u64>,
     clock_sigma_ppm: f32,
 ) -> Option<RotorReading> {
     let locked: Vec<_> =
         rows(readings, id).filter(|(_, rotor)| rotor.status == Status::Locked).collect();
     if let Some((_, last)) = locked.last() {
         let mut rotor = (*last).clone();
-        rotor.speed = mean_speed(&locked, middle_us, clock_sigma_ppm);
+        let pieces: Vec<Piece> = locked
+            .iter()
+            .filter_map(|(reading, rotor)| Some(Piece::new(reading, rotor.speed?)))
+            .collect();
+        rotor.speed = mean_speed(&pieces, span_us, clock_sigma_ppm);
+        let middle_us = span_us.start.midpoint(span_us.end);
         let middle = locked.iter().min_by_key(|(reading, _)| reading.t_us.abs_diff(middle_us));
         if let Some((_, middle)) = middle {
             (rotor.x_px, rotor.y_px) = (middle.x_px, middle.y_px);
@@ -91,44 +98,4 @@ fn over_recording(
         .min_by(|a, b| sigma(a.1).total_cmp(&sigma(b.1)))
         .or_else(|| rows(readings, id).last())
         .map(|(_, rotor)| rotor.clone())
-}
-
-/// Mean speed over the recording: where there are three readings or more, the value of a straight line through
-/// them at the recording's middle, so that a ramp whose last piece no window covers is not cut short.
-fn mean_speed(
-    locked: &[(&Reading, &RotorReading)],
-    middle_us: u64,
-    clock_sigma_ppm: f32,
-) -> Option<Speed> {
-    let speeds: Vec<(f64, Speed)> = locked
-        .iter()
-        .filter_map(|(reading, rotor)| {
-            Some(((reading.t_us as f64 - middle_us as f64) * 1e-6, rotor.speed?))
-        })
-        .collect();
-    let (_, first) = speeds.first()?;
-    let n = speeds.len() as f64;
-    let mean = speeds.iter().map(|(_, s)| f64::from(s.omega_rad_s)).sum::<f64>() / n;
-    let t_mean = speeds.iter().map(|(t, _)| t).sum::<f64>() / n;
-    let tt: f64 = speeds.iter().map(|(t, _)| (t - t_mean).powi(2)).sum();
-    let ty: f64 =
-        speeds.iter().map(|(t, s)| (t - t_mean) * (f64::from(s.omega_rad_s) - mean)).sum();
-    let slope = if speeds.len() >= 3 && tt > 0.0 { Some(ty / tt) } else { None };
-    let omega = mean - slope.unwrap_or(0.0) * t_mean;
-    let variance =
-        speeds.iter().map(|(_, s)| f64::from(s.omega_sigma_rad_s).powi(2)).sum::<f64>() / n;
-    let clock = (f64::from(clock_sigma_ppm) * 1e-6 * omega).powi(2);
-    let independent = (n / OVERLAP).max(1.0);
-    // What the line's slope adds at the middle.
-    let lever = if tt > 0.0 { 1.0 + n * t_mean * t_mean / tt } else { 1.0 };
-    let sigma = ((variance - clock).max(0.0) * lever / independent + clock).sqrt();
-    // A slope is told only where it stands out of the error of the single readings.
-    let slope =
-        slope.filter(|slope| slope.abs() * tt.sqrt() > 4.0 * OVERLAP.sqrt() * variance.sqrt());
-    Some(Speed {
-        omega_rad_s: omega as f32,
-        omega_sigma_rad_s: sigma as f32,
-        alpha_rad_s2: slope.map(|slope| slope as f32),
-        frame: first.frame,
-    })
 }

@@ -127,7 +127,7 @@ mod tests {
         let geometry = Geometry::new(scene.width_px, scene.height_px).unwrap();
         let settings = Settings::new(geometry);
         let (readings, _) = measure_events(&made.events, &[], settings, Capacity::Full);
-        let summary = summarise(&readings, 75_000, 15.0);
+        let summary = summarise(&readings, &(0..150_000), 15.0);
         let facts = FileFacts { file: "a<b>.raw".to_owned(), ..FileFacts::default() };
         let subject = Subject {
             facts: &facts,

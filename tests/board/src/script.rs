@@ -16,6 +16,8 @@
 //! | `lcd FILE.png`, `log FILE` | what is on the panel; what the device logged so far |
 //! | `pc plug`, `pc unplug` | the cable of the PC |
 //! | `break_sdram OFFSET` | one bit of SDRAM reads as zero |
+//! | `stop_crystal` | the crystal stops, for good |
+//! | `flash OFFSET FILE` | a programmer writes a file into the serial flash |
 //! | `power_cut`, `power_cut_writing` | power goes and comes back; in the middle of the next write to the serial flash |
 //! | `reset` | the black button |
 //! | `report` | instructions, interrupts, traffic, faults, as JSON |
@@ -35,6 +37,7 @@ use serde_json::json;
 
 use crate::chip::rcc::Cause;
 use crate::cpu;
+use crate::cpu::nvic;
 use crate::injury::Injury;
 use crate::machine::Machine;
 use crate::time::{MS, S};
@@ -146,6 +149,21 @@ impl Script {
                 board.disturbed();
             }
             "break_sdram" => self.machine.break_sdram(number(rest)?)?,
+            "stop_crystal" => {
+                let mut board = self.machine.board.borrow_mut();
+                if board.rcc.stop_crystal() {
+                    board.nvic.pend(nvic::NMI);
+                }
+                board.clocks_changed();
+                board.disturbed();
+            }
+            "flash" => {
+                let (at, path) = rest.split_once(' ').ok_or_else(|| anyhow!("flash OFFSET FILE"))?;
+                let (at, bytes): (usize, _) = (number(at)?, std::fs::read(path).with_context(|| path.to_owned())?);
+                let mut board = self.machine.board.borrow_mut();
+                let cells = board.quadspi.flash.cells.get_mut(at..at + bytes.len());
+                cells.ok_or_else(|| anyhow!("{path} does not fit"))?.copy_from_slice(&bytes);
+            }
             "power_cut" => {
                 self.machine.board.borrow_mut().power_off();
                 self.run_until(self.machine.now() + MS)?;

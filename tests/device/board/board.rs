@@ -231,6 +231,18 @@ impl Board {
         serde_json::from_str(&self.say("camera")).expect("JSON")
     }
 
+    /// Writes something into the serial flash, as a programmer does.
+    pub fn flash(&mut self, at: u32, bytes: &[u8]) {
+        let path = self.folder.path().join("flash.bin");
+        std::fs::write(&path, bytes).expect("a file");
+        self.say(&format!("flash {at} {}", path.display()));
+    }
+
+    /// The blue button goes down, and stays there.
+    pub fn hold_button(&mut self) {
+        self.say("press");
+    }
+
     /// Something goes wrong, in the emulator's words.
     pub fn break_(&mut self, what: &str) {
         self.say(what);

@@ -185,6 +185,27 @@ fn sdram_that_fails_its_test_is_told() {
 }
 
 #[test]
+fn a_crystal_that_does_not_swing_is_told() {
+    let Some(mut board) = Board::switch_on() else { return };
+    board.run(1.0);
+    assert_eq!(board.report()["on_crystal"], true);
+    // In the middle of something: the non-maskable interrupt ends the program, and the next start finds no crystal.
+    board.break_("stop_crystal");
+    board.run(1.5);
+    let report = board.report();
+    assert_eq!((&report["on_crystal"], &report["resets"][1]), (&false.into(), &"Software".into()));
+    let mut instrument = Instrument::new(Preferences::default());
+    instrument.fail(Fault::Crystal);
+    assert_eq!(differing(&board.lcd(), &drawn(&instrument)), 0, "pixels that differ from the PC's");
+    // Nothing takes that away.
+    board.press(0.1);
+    board.tap(240, 254);
+    assert_eq!(differing(&board.lcd(), &drawn(&instrument)), 0, "pixels that differ from the PC's");
+    board.run(10.0);
+    assert_eq!(board.report()["resets"].as_array().map(Vec::len), Some(2), "the watchdog is fed");
+}
+
+#[test]
 fn a_camera_that_sees_nothing_for_a_minute_starves_nobody() {
     let still = Loaded { geometry: DAVIS346, events: Vec::new() };
     let Some(mut board) = reading(&still) else { return };

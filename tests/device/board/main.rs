@@ -4,6 +4,7 @@ mod board;
 mod boot;
 mod camera;
 mod faults;
+mod replay;
 mod walk;
 
 use evtach_core::{Event, Geometry};

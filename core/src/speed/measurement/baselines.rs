@@ -1,23 +1,33 @@
 //! Registration at ever longer baselines: refinement, lock, and the test that tells an alias.
 
-use super::super::baseline::{Pace, Pairs};
+use super::super::baseline::{Effort, Pace, Pairs};
 use super::{COARSE_AGREEMENT, Measurement, Stage};
+use crate::limits::SLICE_POINTS;
 use crate::reading::Reason;
 use crate::registration::Icp;
 use crate::store::Window;
 
 /// Slice pairs: refinement, lock, fractional-baseline test.
-pub(super) const REFINEMENT_PAIRS: u32 = 12;
-const LOCK_PAIRS: u32 = 8;
-const FRACTIONAL_PAIRS: u32 = 3;
+pub(super) const REFINEMENT: Effort = Effort { pairs: 12, points: SLICE_POINTS, settled: 0.1 };
+/// The paper's further refinement, kept to show what it gains.
+const FURTHER: Effort = Effort { pairs: 6, ..REFINEMENT };
+const LOCK: Effort = Effort { pairs: 8, settled: 0.2, ..REFINEMENT };
+/// A baseline that is not the longest only has to bear the next.
+const ON_THE_WAY: Effort = Effort { pairs: 4, ..LOCK };
+/// A baseline that is longer by less than this factor is not worth a lock of its own.
+const MORE: f32 = 1.5;
+const FRACTIONAL: Effort = Effort { pairs: 3, ..LOCK };
 /// The lock of a rotor that is followed: the phase tells its speed, and these bear it out.
-const FOLLOWING_PAIRS: u32 = 3;
+const FOLLOWING: Effort = Effort { pairs: 3, points: SLICE_POINTS / 2, ..LOCK };
 /// Where there are more events than this for each pair, more pairs are registered, up to [`MAX_PAIRS`].
-const PAIR_EVENTS: usize = 1_024;
+const PAIR_EVENTS: usize = 1_536;
 /// Step of the refinement in symmetry periods (paper: eta x half an angle of symmetry, eta = 0.8).
 pub(super) const REFINEMENT_PERIODS: f32 = 0.4;
 /// Baseline of the lock as a share of the window.
 const LOCK_SHARE: f32 = 2.0 / 3.0;
+/// Relative error that the speed is thought to have before the lock: what refinement says, within these.
+const LEAST_START: f32 = 1e-3;
+const MOST_START: f32 = 1e-2;
 /// A step to m periods is safe while three standard errors stay below this share of a period.
 const SAFE_SLIP: f32 = 0.33;
 
@@ -30,14 +40,14 @@ impl Measurement {
         }
     }
 
-    pub(super) fn plan(&mut self, window: &Window<'_>, periods: f32, pairs: u32) {
-        let plan = Pairs::plan(self.pace(), periods, pairs, self.events, window.duration_us);
+    pub(super) fn plan(&mut self, window: &Window<'_>, periods: f32, effort: Effort) {
+        let plan = Pairs::plan(self.pace(), periods, effort, self.events, window.duration_us);
         self.pairs = Some(plan);
     }
 
     /// As many pairs as so many events are worth.
-    pub(super) fn worth(&self, least: u32) -> u32 {
-        least.max((self.events / PAIR_EVENTS) as u32)
+    pub(super) fn worth(&self, least: Effort) -> Effort {
+        Effort { pairs: least.pairs.max((self.events / PAIR_EVENTS) as u32), ..least }
     }
 
     /// Advances the planned pairs; the finished set once all are registered.
@@ -60,7 +70,7 @@ impl Measurement {
         {
             return self.refuse(Reason::Ambiguous);
         }
-        self.plan(window, REFINEMENT_PERIODS, self.worth(REFINEMENT_PAIRS));
+        self.plan(window, REFINEMENT_PERIODS, self.worth(FURTHER));
         if let Some(pairs) = &mut self.pairs {
             pairs.retarget(refined.omega_rad_s);
         }
@@ -70,8 +80,13 @@ impl Measurement {
     /// The paper's further refinement, kept to show what it gains.
     pub(super) fn further(&mut self, window: &Window<'_>, icp: &mut Icp) {
         let Some(pairs) = self.advance(window, icp) else { return };
-        self.evidence.further_rad_s = pairs.median().map(|found| found.omega_rad_s);
-        self.plan_lock(window, self.omega_rad_s.abs() * 0.01);
+        let found = pairs.median();
+        self.evidence.further_rad_s = found.map(|found| found.omega_rad_s);
+        let sigma = found.map_or(f32::MAX, |found| {
+            found.sigma_rad_s.max((found.omega_rad_s - self.omega_rad_s).abs())
+        });
+        let whole = self.omega_rad_s.abs();
+        self.plan_lock(window, sigma.max(LEAST_START * whole).min(MOST_START * whole));
         self.stage = Stage::Lock;
     }
 
@@ -80,14 +95,21 @@ impl Measurement {
         let pace = self.pace();
         let periods = window.duration_us as f32 / pace.period_us();
         let safe = SAFE_SLIP * pace.omega_rad_s.abs() / (3.0 * sigma_rad_s);
-        let mut m = libm::floorf((LOCK_SHARE * periods).min(safe)).max(1.0);
+        let longest = LOCK_SHARE * periods;
+        let mut m = libm::floorf(longest.min(safe)).max(1.0);
         // Where the parts differ, only a whole revolution brings back the same picture.
         let parts = pace.parts as f32;
         if !self.alike && m >= parts {
             m = libm::floorf(m / parts) * parts;
         }
-        let pairs = if self.follows { FOLLOWING_PAIRS } else { self.worth(LOCK_PAIRS) };
-        self.plan(window, m, pairs);
+        let effort = if self.follows {
+            FOLLOWING
+        } else if longest > MORE * m {
+            ON_THE_WAY
+        } else {
+            self.worth(LOCK)
+        };
+        self.plan(window, m, effort);
     }
 
     /// Long-baseline lock.
@@ -101,12 +123,12 @@ impl Measurement {
             self.omega_rad_s = found.omega_rad_s;
             let sigma = found.sigma_rad_s.max(found.omega_rad_s.abs() * 1e-5);
             self.plan_lock(window, sigma);
-            if self.pairs.as_ref().is_some_and(|next| next.periods() > 1.5 * longest) {
+            if self.pairs.as_ref().is_some_and(|next| next.periods() > MORE * longest) {
                 return;
             }
         }
-        let pairs = if self.follows { 1 } else { FRACTIONAL_PAIRS };
-        self.plan(window, (longest - 0.35).max(0.65), pairs);
+        let effort = if self.follows { Effort { pairs: 1, ..FOLLOWING } } else { FRACTIONAL };
+        self.plan(window, (longest - 0.35).max(0.65), effort);
         self.stage = Stage::Fractional;
     }
 

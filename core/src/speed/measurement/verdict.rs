@@ -1,11 +1,23 @@
 //! The verdict on a rotor: what the witnesses say together, and how sure they are.
 
 use super::super::baseline::Estimate;
-use super::{LEAST_BLUR, Measurement, Stated};
+use super::{Measurement, Stated};
 use crate::math::{TAU, sqrt};
 use crate::reading::{Reason, Status};
+use crate::speed::queue::stretch;
 use crate::store::Window;
 
+/// A rotor keeps at least this share of its events in step, if they have no jitter.
+const LEAST_COHERENCE: f32 = 0.3;
+/// Blur of the rotor's edges, as a share of its radius and in pixels for a small one, beyond which they are no edges;
+/// and within which they are so sharp that a registration that went astray does not count against them.
+const MOST_BLUR: (f32, f32) = (0.1, 1.5);
+const LEAST_BLUR: (f32, f32) = (0.06, 1.3);
+/// Standard deviation of the events' times in dim light.
+const MOST_JITTER_S: f32 = 150e-6;
+/// Blur that a jitter of one pixel makes as the pose measures it, where the harmonic rises by doubling: up to half an octave
+/// past the best, where 1 / (m exp(-m^2 / 2)) is 1.9.
+const BLUR_OF_JITTER: f32 = 1.9;
 /// Farthest deviation of the fractional-baseline test, as a share of the angle of symmetry.
 const MOST_DEVIATION: f32 = 0.03;
 /// Witnesses of the lock may differ by this much, or by eight standard errors.
@@ -25,6 +37,8 @@ const MOST_COARSE_SIGMA: f32 = 0.012;
 const SHAKE_PX: f32 = 3.0;
 /// What shadows, flicker and folded slices may bias a registration by, in radians: a fifth of a pixel half-way to the rim.
 const BIAS_RAD: f32 = 5e-3;
+/// Standard deviation of the error by a busy readout, as a share of how far its queue may stretch the window.
+const QUEUE_SIGMA: f32 = 0.5;
 /// Roll of a hand-held camera for each pixel of shift: tremor turns the camera by about one milliradian as
 /// it shifts the image by one pixel.
 const ROLL_RAD_PER_PX: f32 = 1e-3;
@@ -41,6 +55,7 @@ impl Measurement {
             .map(|lock| self.with_bias(lock));
         let phase = witness(self.evidence.phase_rad_s, self.evidence.phase_sigma_rad_s);
         let window_s = window.duration_us as f32 * 1e-6;
+        let held_up = QUEUE_SIGMA * stretch(window);
         if let (Some(lock), Some(phase)) = (lock, phase) {
             let apart = (lock.omega_rad_s - phase.omega_rad_s).abs();
             let sigma =
@@ -51,7 +66,8 @@ impl Measurement {
             let deviation = self.evidence.fractional_deviation.map(|d| d * parts as f32);
             let whole = deviation.is_some_and(|d| d < MOST_DEVIATION);
             let both = combine(lock, phase);
-            let sharp = both.sigma_rad_s < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
+            let sharp = both.sigma_rad_s.max(held_up * both.omega_rad_s.abs())
+                < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
             let long = self.wanted_us <= 1.02 * window.duration_us as f32;
             if !agree || !whole {
                 self.status = Status::Refused(Reason::Ambiguous);
@@ -63,10 +79,20 @@ impl Measurement {
                 let spread = ALIKE_SIGMA * self.estimate.sigma_rad_s;
                 let sigma_rad_s = sqrt(both.sigma_rad_s * both.sigma_rad_s + spread * spread);
                 self.estimate = Estimate { sigma_rad_s, ..both };
+            } else {
+                // Too rough for a lock, and no better than either.
+                let spread = self.estimate.sigma_rad_s;
+                let sigma_rad_s = sqrt(both.sigma_rad_s * both.sigma_rad_s + spread * spread);
+                self.estimate = Estimate { sigma_rad_s, ..both };
             }
         }
         if phase.is_none() || (lock.is_none() && !self.coarse_stands(phase)) {
             self.status = Status::Refused(Reason::Ambiguous);
+        }
+        if let (None, Some(phase)) = (lock, phase) {
+            let both = combine(self.estimate, phase);
+            let sigma_rad_s = both.sigma_rad_s.max(self.estimate.sigma_rad_s);
+            self.estimate = Estimate { sigma_rad_s, ..both };
         }
         let clock = stated.clock_sigma_ppm * 1e-6 * self.estimate.omega_rad_s;
         let roll = if self.drift_px_s > STILL_PX_S {
@@ -74,12 +100,44 @@ impl Measurement {
         } else {
             0.0
         };
+        let own = self.estimate.sigma_rad_s;
+        let late = held_up * self.estimate.omega_rad_s;
+        self.estimate.sigma_rad_s = sqrt(own * own + late * late);
         if self.status == Status::Coarse {
             self.widen_coarse();
         }
         let own = self.estimate.sigma_rad_s;
         self.estimate.sigma_rad_s = sqrt(own * own + clock * clock);
         self.roll_sigma_rad_s = roll;
+    }
+
+    /// Share of the events that a rotor of this speed keeps in step at least: jitter of sigma scatters a phase of m w t by m w sigma.
+    pub(super) fn least_coherence(&self) -> f32 {
+        let scatter_rad = self.harmonic as f32 * self.omega_rad_s * MOST_JITTER_S;
+        // exp(-x^2 / 2) to a few percent, and never zero.
+        let kept = 1.0 / (1.0 + 0.25 * scatter_rad * scatter_rad);
+        LEAST_COHERENCE * kept * kept
+    }
+
+    /// Whether the rotor has edges: what merely keeps step with one frequency has none, and a wrong harmonic about a wrong
+    /// centre has no overtone.
+    pub(super) fn has_edges(&self) -> bool {
+        if self.in_doubt() {
+            return false;
+        }
+        let most_px = self.blur_px(MOST_BLUR).max(self.pose.least_blur_px());
+        self.pose.blur_px() < most_px
+    }
+
+    /// Whether the edges are so sharp that a registration that went astray does not count against them.
+    pub(super) fn sharp(&self) -> bool {
+        self.pose.sharpness_px() < self.blur_px(LEAST_BLUR)
+    }
+
+    fn blur_px(&self, (share, px): (f32, f32)) -> f32 {
+        let radius_px = self.disc.radius_px;
+        let jitter_px = 0.5 * radius_px * self.omega_rad_s.abs() * MOST_JITTER_S;
+        (share * radius_px).max(px) + BLUR_OF_JITTER * jitter_px
     }
 
     /// Adds to the lock's error what may bias all its registrations alike.
@@ -112,7 +170,7 @@ impl Measurement {
                 && phase.sigma_rad_s < COARSE_PHASE_SIGMA * omega.abs()
         });
         let alike = |rate: &f32| (rate - omega).abs() < COARSE_SPREAD * omega.abs();
-        even && (self.rates.iter().all(alike) || self.sharp(LEAST_BLUR))
+        even && !self.doubted() && (self.rates.iter().all(alike) || self.sharp())
     }
 }
 

@@ -3,18 +3,19 @@
 use heapless::Vec;
 use nalgebra::{Matrix3, Vector3};
 
-use super::super::path::{Knot, Path};
+use super::super::path::Path;
 use crate::limits::MAX_KNOTS;
 
 /// Fewest events in a block that counts.
-const LEAST_IN_BLOCK: u32 = 16;
+const LEAST_IN_BLOCK: f32 = 16.0;
 /// Share of a block's events in step, over that of all, below which the block is not believed, and the least.
 pub const BLOCK_SHARE: f32 = 0.4;
 pub const LEAST_SHARE: f32 = 0.05;
 /// How far the axis is thought to be off the path, in pixels: keeps the shift of a block finite where its events lie to
 /// one side of the axis.
 const SHIFT_PRIOR_PX: f32 = 2.0;
-/// How far the path walks from knot to knot.
+/// How far the path walks from knot to knot that are so far apart, or nearer.
+pub const WALK_US: f32 = 5_000.0;
 pub const WALK_PX: f32 = 0.5;
 /// The same for a rotor with a single mark, whose shift and turn look alike.
 pub const WALK_SINGLE_PX: f32 = 0.05;
@@ -22,73 +23,96 @@ const WALK_RAD: f32 = 0.02;
 /// Farthest that a knot is moved at once.
 const STRIDE_PX: f32 = 3.0;
 
-/// Sums over the events of a block.
+/// Sums over the events of a block. An event's phase changes with turn and shift by m (1, -sin / r, cos / r), with m the
+/// harmonic; m is left out of the sums.
 #[derive(Clone, Copy, Debug)]
 pub struct Block {
-    /// Sums of the products of m, -l sin and l cos, with m the harmonic and l = m / r.
-    normal: [f32; 6],
-    right: Vector3<f32>,
+    count: f32,
+    /// Sums of -sin / r and cos / r, and of their products.
+    levers: [f32; 2],
+    products: [f32; 3],
+    /// Sums of the levers times the sine of the phase that the event is off.
+    right: [f32; 3],
     /// The same, each event by how far through the block it lies.
-    later: Vector3<f32>,
+    later: [f32; 3],
     in_step: f32,
     time_us: f32,
-    count: u32,
+    /// Sums of how far through the block the events lie, and of its square.
+    way: [f32; 2],
 }
 
 impl Block {
     /// Mean time of the events since the middle of the window.
     pub fn middle_us(&self) -> f32 {
-        self.time_us / (self.count as f32).max(1.0)
+        self.time_us / self.count.max(1.0)
     }
 
     /// Share of the events in step.
     pub fn share(&self) -> f32 {
-        self.in_step / (self.count as f32).max(1.0)
+        self.in_step / self.count.max(1.0)
     }
 
     /// No events.
     pub const EMPTY: Self = Self {
-        normal: [0.0; 6],
-        right: Vector3::new(0.0, 0.0, 0.0),
-        later: Vector3::new(0.0, 0.0, 0.0),
+        count: 0.0,
+        levers: [0.0; 2],
+        products: [0.0; 3],
+        right: [0.0; 3],
+        later: [0.0; 3],
         in_step: 0.0,
         time_us: 0.0,
-        count: 0,
+        way: [0.0; 2],
     };
 
-    /// Adds an event: its levers on phase by turn and shift, its phase off the template, and when it came.
-    pub fn add(&mut self, a: Vector3<f32>, (sin_psi, cos_psi): (f32, f32), (t_us, f): (f32, f32)) {
-        let products = [a.x * a.x, a.x * a.y, a.x * a.z, a.y * a.y, a.y * a.z, a.z * a.z];
-        self.normal.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
-        self.right += a * sin_psi;
-        self.later += a * (sin_psi * f);
+    /// Adds an event: how its direction changes with a shift, its phase off the template, and when it came.
+    pub fn add(
+        &mut self,
+        (x, y): (f32, f32),
+        (sin_psi, cos_psi): (f32, f32),
+        (t_us, f): (f32, f32),
+    ) {
+        let (x_psi, y_psi, late) = (x * sin_psi, y * sin_psi, f * sin_psi);
+        self.count += 1.0;
+        self.levers[0] += x;
+        self.levers[1] += y;
+        self.products[0] += x * x;
+        self.products[1] += x * y;
+        self.products[2] += y * y;
+        self.right[0] += sin_psi;
+        self.right[1] += x_psi;
+        self.right[2] += y_psi;
+        self.later[0] += late;
+        self.later[1] += x * late;
+        self.later[2] += y * late;
         self.in_step += cos_psi;
         self.time_us += t_us;
-        self.count += 1;
-    }
-
-    fn normal(&self) -> Matrix3<f32> {
-        let [a, b, c, d, e, f] = self.normal;
-        Matrix3::new(a, b, c, b, d, e, c, e, f)
+        self.way[0] += f;
+        self.way[1] += f * f;
     }
 
     /// What the block knows about turn and shift.
-    fn weight(&self) -> Matrix3<f32> {
-        self.normal() * self.share()
+    fn weight(&self, m: f32) -> Matrix3<f32> {
+        let ([x, y], [xx, xy, yy]) = (self.levers, self.products);
+        Matrix3::new(self.count, x, y, x, xx, xy, y, xy, yy) * (self.share() * m * m)
     }
 
-    /// Turn in radians by which the block as a whole is off, and its weight.
-    pub fn turn_rad(&self) -> Option<(f32, f32)> {
+    /// Shares of the block's weight in the knot before it, between, and in the knot behind it: bursts of events lie anywhere.
+    fn shares(&self) -> (f32, f32, f32) {
+        let per_event = 1.0 / self.count.max(1.0);
+        let (way, square) = (self.way[0] * per_event, self.way[1] * per_event);
+        (1.0 - 2.0 * way + square, way - square, square)
+    }
+
+    /// Turn in radians by which the block as a whole is off at harmonic `m`, and its weight.
+    pub fn turn_rad(&self, m: f32) -> Option<(f32, f32)> {
         if self.count < LEAST_IN_BLOCK {
             return None;
         }
-        let share = self.share();
         // Events scatter by about 1 / (2 share) in phase squared, which gives the prior its weight.
-        let prior = 1.0 / (2.0 * share * SHIFT_PRIOR_PX * SHIFT_PRIOR_PX);
-        let damped =
-            self.normal() * share + Matrix3::from_diagonal(&Vector3::new(0.0, prior, prior));
-        let off_rad = damped.cholesky()?.solve(&self.right)[0];
-        off_rad.is_finite().then_some((off_rad, self.count as f32))
+        let prior = 1.0 / (2.0 * self.share() * SHIFT_PRIOR_PX * SHIFT_PRIOR_PX);
+        let damped = self.weight(m) + Matrix3::from_diagonal(&Vector3::new(0.0, prior, prior));
+        let off_rad = damped.cholesky()?.solve(&(Vector3::from(self.right) * m))[0];
+        off_rad.is_finite().then_some((off_rad, self.count))
     }
 }
 
@@ -101,13 +125,17 @@ pub struct Walk {
     pub coherence: f32,
     /// Angular harmonic that the blocks were looked at by.
     pub harmonic: u32,
+    /// The rotor's radius.
+    pub radius_px: f32,
 }
 
 /// Moves the knots to where the blocks want them: least squares with a path that walks rather than jumps, a
-/// tridiagonal system of 3 x 3 matrices, solved from end to end.
-pub fn correct(path: &mut Path, blocks: &[Block; MAX_KNOTS], walk: Walk) {
+/// tridiagonal system of 3 x 3 matrices, solved from end to end. Returns how far the rim moved at most, in pixels, or `None`
+/// where the blocks give no path.
+pub fn correct(path: &mut Path, blocks: &[Block; MAX_KNOTS], walk: Walk) -> Option<f32> {
     let blocks = &blocks[..path.blocks()];
     let knots = path.knots_mut();
+    let m = walk.harmonic as f32;
     let scatter = 1.0 / (2.0 * walk.coherence.max(LEAST_SHARE));
     let (px, rad) = (scatter / (walk.step_px * walk.step_px), scatter / (WALK_RAD * WALK_RAD));
     let stiff = Matrix3::from_diagonal(&Vector3::new(rad, px, px));
@@ -115,42 +143,44 @@ pub fn correct(path: &mut Path, blocks: &[Block; MAX_KNOTS], walk: Walk) {
         let (a, b) = (knots.get(k)?, knots.get(k + 1)?);
         Some(Vector3::new(b.turn_rad - a.turn_rad, b.x_px - a.x_px, b.y_px - a.y_px))
     };
-    // Events are spread evenly within a block: a third of their weight goes to either knot, a sixth between.
-    let link = |block: &Block| block.weight() / 6.0 - stiff;
+    let link = |block: &Block| block.weight(m) * block.shares().1 - stiff;
     let mut inverses = Vec::<Matrix3<f32>, MAX_KNOTS>::new();
     let mut sides = Vec::<Vector3<f32>, MAX_KNOTS>::new();
     for k in 0..knots.len() {
         let mut pivot = Matrix3::identity() * 1e-3;
         let mut side = Vector3::zeros();
         if let (Some(block), Some(step)) = (blocks.get(k), step(k)) {
-            pivot += block.weight() / 3.0 + stiff;
-            side += block.right - block.later + stiff * step;
+            let (right, later) = (Vector3::from(block.right), Vector3::from(block.later));
+            pivot += block.weight(m) * block.shares().0 + stiff;
+            side += (right - later) * m + stiff * step;
         }
         let before = k
             .checked_sub(1)
             .and_then(|i| Some((blocks.get(i)?, step(i)?, inverses.get(i)?, sides.get(i)?)));
         if let Some((block, step, inverse, before)) = before {
             let link = link(block);
-            pivot += block.weight() / 3.0 + stiff - link * inverse * link;
-            side += block.later - stiff * step - link * (inverse * before);
+            pivot += block.weight(m) * block.shares().2 + stiff - link * inverse * link;
+            side += Vector3::from(block.later) * m - stiff * step - link * (inverse * before);
         }
-        let Some(inverse) = pivot.try_inverse() else { return };
-        inverses.push(inverse).ok();
+        inverses.push(pivot.try_inverse()?).ok();
         sides.push(side).ok();
     }
-    let reach_rad = 1.0 / walk.harmonic as f32;
+    let reach_rad = 1.0 / m;
     let within = |value: f32, reach: f32| value.max(-reach).min(reach);
     let mut off = Vector3::zeros();
+    let mut most_px = 0.0_f32;
     for (k, knot) in knots.iter_mut().enumerate().rev() {
-        let (Some(inverse), Some(side)) = (inverses.get(k), sides.get(k)) else { return };
+        let (inverse, side) = (inverses.get(k)?, sides.get(k)?);
         off = inverse * blocks.get(k).map_or(*side, |block| side - link(block) * off);
         if !off.iter().all(|value| value.is_finite()) {
-            return;
+            return None;
         }
-        *knot = Knot {
-            x_px: knot.x_px + within(off[1], STRIDE_PX),
-            y_px: knot.y_px + within(off[2], STRIDE_PX),
-            turn_rad: knot.turn_rad + within(off[0], reach_rad),
-        };
+        let (x_px, y_px) = (within(off[1], STRIDE_PX), within(off[2], STRIDE_PX));
+        let turn_rad = within(off[0], reach_rad);
+        most_px = most_px.max(x_px.abs()).max(y_px.abs()).max(turn_rad.abs() * walk.radius_px);
+        knot.x_px += x_px;
+        knot.y_px += y_px;
+        knot.turn_rad += turn_rad;
     }
+    Some(most_px)
 }

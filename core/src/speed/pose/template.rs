@@ -11,27 +11,28 @@ pub const BANKS: usize = 2 * RINGS;
 #[derive(Clone, Copy, Debug)]
 pub struct Template {
     sums: [(f32, f32); BANKS],
-    counts: [u16; BANKS],
 }
+
+/// Events by ring and polarity.
+pub type Counts = [u32; BANKS];
 
 impl Template {
     /// Nothing learnt.
-    pub const EMPTY: Self = Self { sums: [(0.0, 0.0); BANKS], counts: [0; BANKS] };
+    pub const EMPTY: Self = Self { sums: [(0.0, 0.0); BANKS] };
 
     /// Adds an event by the (sine, cosine) of its phase.
     pub fn add(&mut self, bank: usize, (sin, cos): (f32, f32)) {
         self.sums[bank].0 += cos;
         self.sums[bank].1 += sin;
-        self.counts[bank] = self.counts[bank].saturating_add(1);
     }
 
-    /// Share of events in step, 0 to 1, corrected for what chance gives.
-    pub fn coherence(&self) -> f32 {
+    /// Share of so many events in step, 0 to 1, corrected for what chance gives.
+    pub fn coherence(&self, counts: &Counts) -> f32 {
         let (mut in_step, mut total) = (0.0, 0.0);
-        for (sum, count) in self.sums.iter().zip(self.counts) {
-            let excess = sum.0 * sum.0 + sum.1 * sum.1 - f32::from(count);
+        for (sum, count) in self.sums.iter().zip(counts) {
+            let excess = sum.0 * sum.0 + sum.1 * sum.1 - *count as f32;
             in_step += sqrt(excess.max(0.0));
-            total += f32::from(count);
+            total += *count as f32;
         }
         in_step / total.max(1.0)
     }

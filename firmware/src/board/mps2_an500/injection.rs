@@ -22,6 +22,8 @@ pub enum Injection {
     Panic(&'static str),
     /// A task goes round in circles.
     Hang(&'static str),
+    /// Measuring takes no more blocks, so that the channel of blocks fills up.
+    FullChannel,
     /// The preferences are overwritten with nonsense before they are read.
     Preferences,
     /// The power goes while preferences are written.
@@ -30,18 +32,19 @@ pub enum Injection {
 
 impl Injection {
     /// All, under their names on the command line.
-    pub const ALL: [(&'static str, Self); 8] = [
+    pub const ALL: [(&'static str, Self); 9] = [
         ("panic:acquire", Self::Panic("acquire")),
         ("panic:measure", Self::Panic("measure")),
         ("panic:show", Self::Panic("show")),
         ("panic:link", Self::Panic("link")),
         ("hang:measure", Self::Hang("measure")),
         ("hang:show", Self::Hang("show")),
+        ("full", Self::FullChannel),
         ("preferences", Self::Preferences),
         ("power", Self::PowerCut),
     ];
 
-    /// Waits for the fault of a task, for ever when it is not to have one.
+    /// Waits for the fault of a task, for ever when it is not to have one. Returns when the task is to end.
     #[expect(clippy::panic, reason = "that is what it is for")]
     pub async fn strike(self, task: &str) {
         Timer::after(AFTER).await;
@@ -51,6 +54,7 @@ impl Injection {
                 // No `spin_loop`: QEMU spends ages on the YIELD that it is.
                 cortex_m::asm::nop();
             },
+            Self::FullChannel if task == "measure" => {}
             _ => core::future::pending().await,
         }
     }
@@ -70,14 +74,14 @@ impl PowerSupply {
             }
             // Something is there to be lost, and the second word of what follows it is cut in its midst.
             Injection::PowerCut => {
-                block_on(
-                    Store::new(&mut *flash, 0, PREFERENCES_BYTES as u32)
-                        .save(&Preferences::default()),
-                )
-                .ok();
+                let mut store = Store::new(Self(flash), 0, PREFERENCES_BYTES as u32);
+                block_on(store.save(&Preferences::default())).ok();
+                let Self(flash) = store.release();
                 flash.cut_power(1, 100);
+                return Self(flash);
             }
-            Injection::None | Injection::Panic(_) | Injection::Hang(_) => {}
+            Injection::None | Injection::Panic(_) | Injection::Hang(_) | Injection::FullChannel => {
+            }
         }
         Self(flash)
     }

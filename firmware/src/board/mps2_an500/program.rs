@@ -117,6 +117,11 @@ pub async fn measure_task(
     let mut costs = Costs::new(Ticks);
     let measuring = measure(tachometer, &mut blocks, Pace::Replay, &mut costs, &mut measuring);
     counted(User::Measure, select(measuring, injection.strike("measure"))).await;
+    loop {
+        // Only where the channel of blocks is to fill up: alive, but taking none.
+        SHARED.alive(Task::Measure);
+        Timer::after_millis(250).await;
+    }
 }
 
 /// Screen, link and keeping the preferences: one task, so that they share the front.

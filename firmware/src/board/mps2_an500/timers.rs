@@ -141,6 +141,25 @@ impl Clock for Ticks {
     }
 }
 
+/// Microseconds in ticks, by 32-bit divisions by a constant, which are multiplications: one of 64 bits is a loop, and the time is
+/// asked for many times in a wait.
+const fn micros(ticks: u64) -> u64 {
+    const DIVISOR: u32 = TICKS_PER_US as u32;
+    /// Quotient and remainder of 2^32.
+    const QUOTIENT: u32 = ((1_u64 << 32) / TICKS_PER_US) as u32;
+    const REMAINDER: u32 = ((1_u64 << 32) % TICKS_PER_US) as u32;
+    let (high, low) = ((ticks >> 32) as u32, ticks as u32);
+    let carried = high % DIVISOR;
+    let rest = (carried * REMAINDER + low % DIVISOR) / DIVISOR;
+    ((high / DIVISOR) as u64) << 32 | (carried * QUOTIENT) as u64 + (low / DIVISOR + rest) as u64
+}
+
+const _: () = {
+    assert!(micros(u64::MAX) == u64::MAX / TICKS_PER_US);
+    assert!(micros(0x12_3456_789a_bcde) == 0x12_3456_789a_bcde / TICKS_PER_US);
+    assert!(micros((25 << 32) - 1) == ((25 << 32) - 1) / TICKS_PER_US);
+};
+
 impl Timers {
     /// Wakes every task that is due, and sets the alarm for the next.
     fn ring(&self, cs: CriticalSection<'_>) {
@@ -164,7 +183,7 @@ impl Timers {
 
 impl Driver for Timers {
     fn now(&self) -> u64 {
-        Ticks.ticks() / TICKS_PER_US
+        micros(Ticks.ticks())
     }
 
     fn schedule_wake(&self, at: u64, waker: &Waker) {

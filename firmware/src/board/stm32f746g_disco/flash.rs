@@ -274,7 +274,7 @@ impl NorFlash for Preferences {
     }
 }
 
-/// The part of it that holds a recording, read as if a bridge sent it.
+/// The part of it that holds a recording, read as if a bridge sent it, again and again.
 pub struct Replay {
     flash: &'static SharedFlash,
     next: u32,
@@ -304,11 +304,13 @@ impl SpiDevice for Replay {
     ) -> Result<(), FlashError> {
         for operation in operations {
             let Operation::Read(bytes) = operation else { return Err(FlashError::ReadOnly) };
-            if self.next.saturating_add(bytes.len() as u32) > BYTES {
-                self.next = REPLAY;
-            }
             self.flash.lock().await.read(self.next, bytes)?;
             self.next += bytes.len() as u32;
+            let ends = self.next.saturating_add(bytes.len() as u32) > BYTES;
+            // Behind the recording the flash is empty: it begins anew.
+            if ends || bytes.iter().all(|&byte| byte == 0xff) {
+                self.next = REPLAY;
+            }
         }
         Ok(())
     }

@@ -23,8 +23,11 @@ const SILENT_READS: u32 = 32;
 /// processor busy.
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// After every read, acquiring rests for so much of the time that it took: a fifth in all.
+/// Acquiring rests for a [`PAUSE`] over this after each: a fifth of the time in all. More often would cost more than it gives.
 const SHARE: u32 = 4;
+
+/// How far ahead of its time a recording may play: a timer for every frame costs as much as a tenth of its events.
+const AHEAD: Duration = Duration::from_millis(1);
 
 /// How acquisition stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -100,8 +103,8 @@ pub async fn acquire<D: SpiDevice, R: Wait, M: RawMutex>(
     let mut session = Session::new(blocks, pace);
     let mut heard = Instant::now();
     let mut silent_reads = 0;
+    let mut rested = Instant::now();
     loop {
-        let begun = Instant::now();
         match sensor.read().await {
             Ok(()) => silent_reads += 1,
             Err(error) if pace.is_endless() => session.failed(&error),
@@ -122,9 +125,10 @@ pub async fn acquire<D: SpiDevice, R: Wait, M: RawMutex>(
                 session.acquired.sensor = None;
             }
             Timer::after(PAUSE).await;
-        } else if pace.is_endless() {
+        } else if pace.is_endless() && rested.elapsed() > PAUSE {
             // However much comes, those below get their share: the bridge drops what is not fetched, and counts it.
-            Timer::after(begun.elapsed().min(PAUSE) / SHARE).await;
+            Timer::after(PAUSE / SHARE).await;
+            rested = Instant::now();
         }
         told(&session.acquired);
     }
@@ -192,7 +196,10 @@ impl<'o, 'b, M: RawMutex> Session<'o, 'b, M> {
         if self.pace.is_timed() {
             let (start, first_us) = *self.origin.get_or_insert_with(|| (Instant::now(), t_us));
             let due = start.checked_add(Duration::from_micros(t_us.saturating_sub(first_us)));
-            Timer::at(due.unwrap_or(Instant::MAX)).await;
+            let due = due.unwrap_or(Instant::MAX);
+            if due.saturating_duration_since(Instant::now()) > AHEAD {
+                Timer::at(due).await;
+            }
         }
     }
 }

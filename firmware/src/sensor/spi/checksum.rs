@@ -5,26 +5,40 @@
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 
-/// What a byte adds to the remainder, with 0 to 3 bytes behind it.
-static TABLES: [[u32; 256]; 4] = {
-    let [t0, t1, t2, t3, ..] = *Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC).table();
-    [t0, t1, t2, t3]
-};
+/// What a byte adds to the remainder, by how many bytes stand behind it in its word. One by one, so that each has a register.
+static BEHIND_0: [u32; 256] = table(0);
+static BEHIND_1: [u32; 256] = table(1);
+static BEHIND_2: [u32; 256] = table(2);
+static BEHIND_3: [u32; 256] = table(3);
+
+const fn table(behind: usize) -> [u32; 256] {
+    Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC).table()[behind]
+}
 
 /// The checksum of bytes.
 pub(super) fn checksum_of(bytes: &[u8]) -> u32 {
-    let [t0, t1, t2, t3] = &TABLES;
     let (words, rest) = bytes.as_chunks::<4>();
+    let (fours, words) = words.as_chunks::<4>();
     let mut remainder = CRC_32_ISO_HDLC.init;
+    for [a, b, c, d] in fours {
+        remainder = add(add(add(add(remainder, a), b), c), d);
+    }
     for word in words {
-        let [b0, b1, b2, b3] = (remainder ^ u32::from_le_bytes(*word)).to_le_bytes();
-        remainder =
-            t3[usize::from(b0)] ^ t2[usize::from(b1)] ^ t1[usize::from(b2)] ^ t0[usize::from(b3)];
+        remainder = add(remainder, word);
     }
     for byte in rest {
-        remainder = t0[usize::from(remainder as u8 ^ byte)] ^ remainder >> 8;
+        remainder = BEHIND_0[usize::from(remainder as u8 ^ byte)] ^ remainder >> 8;
     }
     remainder ^ CRC_32_ISO_HDLC.xorout
+}
+
+#[inline(always)]
+fn add(remainder: u32, word: &[u8; 4]) -> u32 {
+    let [b0, b1, b2, b3] = (remainder ^ u32::from_le_bytes(*word)).to_le_bytes();
+    BEHIND_3[usize::from(b0)]
+        ^ BEHIND_2[usize::from(b1)]
+        ^ BEHIND_1[usize::from(b2)]
+        ^ BEHIND_0[usize::from(b3)]
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
 //! The events in a frame.
 
 use evtach_core::decode::{Evt2, Evt3};
-use evtach_core::{Event, GyroSample};
+use evtach_core::{Event, PackedEvent};
 
 use super::frame::Kind;
 use super::parser::Frame;
-use crate::sensor::outlet;
+use crate::sensor::outlet::{self, Filled};
 
 /// Most events that one word of EVT 3 stands for: a vector.
 const VECTOR_EVENTS: usize = 12;
@@ -21,6 +21,8 @@ pub struct Words<'f> {
     rest: &'f [u8],
     /// What the words' clock leaves out of the time.
     base_us: u64,
+    /// Time of the first event.
+    first_us: u64,
     decoder: Decoder,
 }
 
@@ -41,15 +43,33 @@ impl<'f> Words<'f> {
             Kind::Evt3 => (Decoder::Evt3(Evt3::new()), EVT3_SPAN_US),
             Kind::Hello | Kind::End => (Decoder::None, 1),
         };
-        Self { rest: frame.payload, base_us: frame.header.t_us & !(span_us - 1), decoder }
+        let first_us = frame.header.t_us;
+        Self { rest: frame.payload, base_us: first_us & !(span_us - 1), first_us, decoder }
     }
 
-    /// Most events that one of these words stands for.
+    /// Most events that one of these words stands for: with fewer places, [`Words::pack`] does nothing.
     #[must_use]
     pub const fn most_events_a_word(&self) -> usize {
         match self.decoder {
             Decoder::Evt3(_) => VECTOR_EVENTS,
             Decoder::Evt2(_) | Decoder::None => 1,
+        }
+    }
+
+    /// Packs events until the places may not do for another word, and returns how many.
+    pub fn pack(&mut self, places: &mut [PackedEvent]) -> usize {
+        match &mut self.decoder {
+            Decoder::Evt2(decoder) => {
+                // The clock of these words fills the low bits: nothing of the base is in them.
+                let (words, events) = decoder.pack(self.rest.as_chunks().0, places);
+                self.rest = self.rest.get(words * 4..).unwrap_or_default();
+                events
+            }
+            Decoder::Evt3(decoder) => pack_evt3(decoder, &mut self.rest, self.base_us, places),
+            Decoder::None => {
+                self.rest = &[];
+                0
+            }
         }
     }
 
@@ -84,19 +104,33 @@ impl<'f> Words<'f> {
 
 /// A bridge sends no gyro samples.
 impl outlet::Words for Words<'_> {
-    fn most_events_a_word(&self) -> usize {
-        self.most_events_a_word()
-    }
-
     fn is_done(&self) -> bool {
         self.is_done()
     }
 
-    #[inline]
-    fn decode(&mut self, words: usize, emit: impl FnMut(Event)) -> Option<GyroSample> {
-        self.decode(words, emit);
-        None
+    fn fill(&mut self, space: &mut [PackedEvent]) -> Filled {
+        Filled { events: self.pack(space), near_us: self.first_us, sample: None }
     }
+}
+
+/// Packs the events of words as far as the places are sure to do: one word may be several events.
+fn pack_evt3(
+    decoder: &mut Evt3,
+    rest: &mut &[u8],
+    base_us: u64,
+    places: &mut [PackedEvent],
+) -> usize {
+    let words = take(rest, places.len() / VECTOR_EVENTS);
+    let (count, mut places) = (places.len(), places.iter_mut());
+    for word in words {
+        decoder.decode(u16::from_le_bytes(*word), |event| {
+            if let Some(place) = places.next() {
+                *place =
+                    PackedEvent::pack(&Event { t_us: base_us.wrapping_add(event.t_us), ..event });
+            }
+        });
+    }
+    count - places.len()
 }
 
 /// Takes up to `words` words of `N` bytes off the front. A rest shorter than a word does not exist: the

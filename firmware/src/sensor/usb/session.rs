@@ -38,7 +38,8 @@ const PORT: Duration = Duration::from_millis(20);
 /// Time between two looks at what the camera lost.
 const COUNTERS: Duration = Duration::from_millis(500);
 
-/// After every transfer, acquiring rests for so much of the time that handling it took: a fifth in all.
+/// However much comes, acquiring rests once in such a time, for so much of it: a fifth in all.
+const WORK: Duration = Duration::from_millis(1);
 const SHARE: u32 = 4;
 
 /// Registers that tell what the camera is and has.
@@ -289,6 +290,7 @@ where
         T: FnMut(&Acquired),
     {
         let mut failures = 0;
+        let mut rested = Instant::now();
         loop {
             around.tell();
             let reading = self.found.data.request_in(&mut around.buffer[..]);
@@ -296,10 +298,12 @@ where
             let outcome = match select3(reading, event, Timer::after(SILENCE)).await {
                 Either3::First(Ok(bytes)) => {
                     failures = 0;
-                    let begun = Instant::now();
                     let outcome = self.take(bytes, around).await;
-                    // However much comes, those below get their share: the camera's FIFO waits, and counts what it drops.
-                    Timer::after(begun.elapsed() / SHARE).await;
+                    if rested.elapsed() >= WORK {
+                        // The camera's FIFO waits, and counts what it drops.
+                        Timer::after(WORK / SHARE).await;
+                        rested = Instant::now();
+                    }
                     outcome
                 }
                 Either3::First(Err(error)) => {

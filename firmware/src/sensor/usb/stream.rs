@@ -1,19 +1,13 @@
 //! From the bytes of transfers to events on one clock that never steps back.
 
-use evtach_core::decode::{Davis, Dvxplorer, Mounting};
-use evtach_core::{Event, GyroSample};
+use evtach_core::PackedEvent;
+use evtach_core::decode::{Davis, Dvxplorer, Mounting, Packed};
 
 use super::model::Model;
-use crate::sensor::outlet::Words;
+use crate::sensor::outlet::{Filled, Words};
 
 /// Step of the time when the camera's clock begins anew: longer than any window, so that none spans it.
 const GAP_US: u64 = 3_000_000;
-
-/// The word by which the camera tells that its clock was set to zero.
-const CLOCK_RESET: [u8; 2] = 1_u16.to_le_bytes();
-
-/// Most events that one word of a DVXplorer stands for: a group of pixels.
-const GROUP_EVENTS: usize = 8;
 
 /// The words of a camera, and the time that they tell.
 #[derive(Clone, Debug)]
@@ -73,6 +67,16 @@ impl Stream {
         TransferWords { stream: self, rest }
     }
 
+    fn pack(&mut self, words: &[[u8; 2]], events: &mut [PackedEvent]) -> Packed {
+        let (offset_us, reached_us) = (self.offset_us, &mut self.reached_us);
+        match &mut self.decoder {
+            Decoder::Davis(decoder) => decoder.pack(words, offset_us, reached_us, events),
+            Decoder::Dvxplorer { words: decoder, swap_xy } => {
+                decoder.pack(words, *swap_xy, offset_us, reached_us, events)
+            }
+        }
+    }
+
     fn reset(&mut self) {
         self.clock_resets = self.clock_resets.saturating_add(1);
         self.offset_us = self.reached_us.saturating_add(GAP_US);
@@ -87,51 +91,17 @@ pub(super) struct TransferWords<'w> {
 }
 
 impl Words for TransferWords<'_> {
-    fn most_events_a_word(&self) -> usize {
-        match self.stream.decoder {
-            Decoder::Davis(_) => 1,
-            Decoder::Dvxplorer { .. } => GROUP_EVENTS,
-        }
-    }
-
     fn is_done(&self) -> bool {
         self.rest.is_empty()
     }
 
-    #[inline]
-    fn decode(&mut self, words: usize, mut emit: impl FnMut(Event)) -> Option<GyroSample> {
-        let (now, later) = self.rest.split_at(words.min(self.rest.len()));
-        let stream = &mut *self.stream;
-        for (index, word) in now.iter().enumerate() {
-            if *word == CLOCK_RESET {
-                stream.reset();
-            }
-            let (offset_us, reached_us) = (stream.offset_us, &mut stream.reached_us);
-            let mut place = |event: Event| {
-                // A word that was damaged must not turn time back.
-                *reached_us = (*reached_us).max(offset_us.saturating_add(event.t_us));
-                emit(Event { t_us: *reached_us, ..event });
-            };
-            let word = u16::from_le_bytes(*word);
-            let sample = match &mut stream.decoder {
-                Decoder::Davis(decoder) => decoder.decode(word, place),
-                Decoder::Dvxplorer { words, swap_xy: false } => {
-                    words.decode(word, place);
-                    None
-                }
-                Decoder::Dvxplorer { words, swap_xy: true } => {
-                    words.decode(word, |event| place(Event { x: event.y, y: event.x, ..event }));
-                    None
-                }
-            };
-            if let Some(sample) = sample {
-                let t_us = offset_us.saturating_add(sample.t_us);
-                stream.reached_us = stream.reached_us.max(t_us);
-                self.rest = &self.rest[index + 1..];
-                return Some(GyroSample { t_us, ..sample });
-            }
+    fn fill(&mut self, space: &mut [PackedEvent]) -> Filled {
+        let near_us = self.stream.reached_us;
+        let packed = self.stream.pack(self.rest, space);
+        if packed.reset {
+            self.stream.reset();
         }
-        self.rest = later;
-        None
+        self.rest = self.rest.get(packed.words..).unwrap_or_default();
+        Filled { events: packed.events, near_us, sample: packed.sample }
     }
 }

@@ -24,7 +24,7 @@ pub fn conclusive(readings: &[Reading]) -> Option<&Reading> {
 /// The reading over a whole recording of several windows, as `measure` shows it.
 pub fn overall(readings: &[Reading], end_us: u64, clock_sigma_ppm: f32) -> Option<Reading> {
     let last = readings.last()?;
-    let summary = summarise(readings, end_us / 2, clock_sigma_ppm);
+    let summary = summarise(readings, &(0..end_us), clock_sigma_ppm);
     Some(Reading {
         t_us: end_us / 2,
         window_us: u32::try_from(end_us).unwrap_or(u32::MAX),

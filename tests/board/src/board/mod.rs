@@ -297,7 +297,8 @@ impl Board {
         }
     }
 
-    fn clocks_changed(&mut self) {
+    /// To be called when they may have.
+    pub fn clocks_changed(&mut self) {
         let clocks = self.rcc.clocks();
         let now = self.pulse.now.get();
         self.pulse.instruction_ps.set(S.div_ceil(clocks.hclk_hz.max(1)));

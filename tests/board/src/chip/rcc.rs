@@ -10,6 +10,9 @@ const CSR: u32 = 0x74;
 const DCKCFGR1: u32 = 0x8c;
 /// Oscillators and PLLs in CR: their "on" bits; each is ready at the bit above.
 const CR_ON: u32 = 1 | 1 << 16 | 1 << 24 | 1 << 26 | 1 << 28;
+const HSEON: u32 = 1 << 16;
+/// The crystal is watched.
+const CSSON: u32 = 1 << 19;
 const HSI_HZ: u64 = 16_000_000;
 /// The crystal on the Discovery board.
 const HSE_HZ: u64 = 25_000_000;
@@ -58,12 +61,14 @@ pub struct Clocks {
 pub struct Rcc {
     words: Plain,
     causes: u32,
+    /// The crystal does not swing.
+    still: bool,
 }
 
 impl Default for Rcc {
     fn default() -> Self {
         const RESET: &[(u32, u32)] = &[(CR, 0x83), (PLLCFGR, 0x2400_3010), (0x30, 0x0010_0000)];
-        Self { words: Plain::new(RESET), causes: Cause::Power.bits() }
+        Self { words: Plain::new(RESET), causes: Cause::Power.bits(), still: false }
     }
 }
 
@@ -109,6 +114,19 @@ impl Rcc {
         source * u64::from(n) / u64::from(m.max(1)) / u64::from(p)
     }
 
+    /// The crystal stops, for good. Whether the chip's clock security system notices: it goes on at its own oscillator then, and
+    /// raises the non-maskable interrupt.
+    pub fn stop_crystal(&mut self) -> bool {
+        self.still = true;
+        let control = self.words.get(CR);
+        let noticed = control & CSSON != 0 && control & HSEON != 0;
+        if noticed {
+            self.words.write(CR, control & !HSEON | 1, 4, 0);
+            self.words.write(CFGR, self.words.get(CFGR) & !3, 4, 0);
+        }
+        noticed
+    }
+
     /// The crystal runs and is what the processor's clock is made from.
     pub fn on_crystal(&self) -> bool {
         match self.words.get(CFGR) & 3 {
@@ -124,7 +142,8 @@ impl Device for Rcc {
         let value = self.words.get(at);
         match at {
             CR => {
-                let on = value & CR_ON;
+                let dead = if self.still { HSEON } else { 0 };
+                let on = value & CR_ON & !dead;
                 value & !(CR_ON << 1) | on << 1
             }
             CFGR => value & !0xc | (value & 3) << 2,

@@ -2,13 +2,20 @@ use proptest::prelude::*;
 
 use super::super::stream::Stream;
 use super::*;
-use crate::sensor::outlet::Words as _;
+use crate::sensor::outlet::{Filled, Words as _};
+use evtach_core::PackedEvent;
 use evtach_core::decode::Mounting;
 
 fn decode(stream: &mut Stream, bytes: &[u8], events: &mut Vec<Event>) {
     let mut words = stream.words(bytes);
     while !words.is_done() {
-        words.decode(100, |event| events.push(event));
+        let mut space = [PackedEvent::ZERO; 20];
+        let Filled { events: count, mut near_us, .. } = words.fill(&mut space);
+        for packed in &space[..count] {
+            let event = packed.unpack(near_us);
+            near_us = event.t_us;
+            events.push(event);
+        }
     }
 }
 

@@ -1,0 +1,102 @@
+//! Which rounds the pose is found in, and what each looks at.
+
+/// Corrections that move the rim by less than this, in pixels, are the last of their phase.
+const SETTLED_PX: f32 = 0.3;
+
+/// Phases, each with more of the window's detail than the one before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Phase {
+    /// A path of few blocks.
+    First,
+    /// One of some more.
+    Second,
+    /// As many blocks as a sample of the events allows; the harmonic is raised as far as it goes.
+    Fine,
+    /// As many as all events allow.
+    All,
+    /// One more look gives the trend.
+    Last,
+}
+
+/// Rounds at most, and events, of each phase.
+#[derive(Clone, Copy, Debug)]
+pub struct Schedule {
+    phase: Phase,
+    /// Rounds of this phase so far.
+    round: u8,
+    /// Most rounds by phase.
+    most: [u8; 4],
+    /// Events looked at before [`Phase::All`], and the share of all events, at most 65 536, looked at from then on.
+    first_events: usize,
+    share: usize,
+}
+
+/// Most events that are looked at.
+const MOST_EVENTS: usize = 65_536;
+/// Blocks of the path in the first two phases.
+const FIRST_BLOCKS: usize = 12;
+const SECOND_BLOCKS: usize = 24;
+
+impl Schedule {
+    /// For a rotor of which little is known.
+    pub const NEW: Self =
+        Self { phase: Phase::First, round: 0, most: [3, 1, 6, 3], first_events: 3_072, share: 1 };
+    /// For a rotor that was followed in the window before: a third of the events tell it as well.
+    pub const KNOWN: Self = Self { most: [1, 0, 3, 1], first_events: 1_536, share: 3, ..Self::NEW };
+
+    /// The phase that the next round belongs to.
+    pub const fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// Whether the path has had as many blocks as in [`Phase::Fine`] for a round.
+    pub fn is_fine(&self) -> bool {
+        self.phase > Phase::Fine || self.phase == Phase::Fine && self.round > 0
+    }
+
+    /// The template has to be learnt anew: the last phase that corrects the path begins again, if it has begun.
+    pub const fn again(&mut self) {
+        if matches!(self.phase, Phase::All | Phase::Last) {
+            self.phase = Phase::All;
+            self.round = 0;
+        }
+    }
+
+    /// Ends a round that moved the rim by so much; `true` when a new phase begins.
+    pub fn advance(&mut self, moved_px: f32) -> bool {
+        self.round += 1;
+        let most = self.most.get(self.phase as usize).copied().unwrap_or(0);
+        // In the first fine round the harmonic is not raised yet.
+        let settled = moved_px < SETTLED_PX && (self.phase != Phase::Fine || self.round > 1);
+        if !settled && self.round < most {
+            return false;
+        }
+        self.round = 0;
+        self.phase = match self.phase {
+            Phase::First if self.most[1] > 0 => Phase::Second,
+            Phase::First => Phase::Fine,
+            Phase::Second => Phase::Fine,
+            Phase::Fine => Phase::All,
+            Phase::All | Phase::Last => Phase::Last,
+        };
+        true
+    }
+
+    /// Events that this round looks at, at most, of so many.
+    pub fn events(&self, all: usize) -> usize {
+        if self.phase < Phase::All {
+            self.first_events
+        } else {
+            (all / self.share).clamp(self.first_events, MOST_EVENTS)
+        }
+    }
+
+    /// Most blocks of the path in this phase.
+    pub const fn blocks(&self) -> usize {
+        match self.phase {
+            Phase::First => FIRST_BLOCKS,
+            Phase::Second => SECOND_BLOCKS,
+            Phase::Fine | Phase::All | Phase::Last => usize::MAX,
+        }
+    }
+}

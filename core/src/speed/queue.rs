@@ -1,0 +1,108 @@
+//! A readout that cannot keep up: its queue hands events out at a constant pace, and stamps them late by its length.
+//!
+//! Where many pixels fire, events come at random: the time that a number of them takes scatters as in a Poisson
+//! process. From a queue that never runs empty they come like a clock. While such a queue fills, time is
+//! stretched, and all speeds are read too low by the same share; nothing else in the events tells.
+
+use crate::store::{StoredEvent, Window};
+
+/// Events whose time is taken together: few against those of one edge that crosses a pixel, many against the microsecond.
+const GROUP: usize = 32;
+/// Most groups of a segment.
+const MOST_GROUPS: usize = 16;
+/// Fewest groups that are judged.
+const LEAST_GROUPS: u32 = 8;
+/// Variance of the difference of two times rounded to the microsecond.
+const ROUNDING_US2: f32 = 1.0 / 6.0;
+/// Scatter below which events come from a queue, as a share of that of a Poisson process: scenes that are not held up stay
+/// above a third.
+const MOST_SCATTER: f32 = 0.2;
+/// Events that a readout may hold.
+const QUEUE_EVENTS: f32 = 4_096.0;
+
+/// Share by which the time of the window may be stretched: 0 unless the readout was busy all through it.
+/// Cost: 20 000 instructions, and one pass over the window where it was.
+#[must_use]
+pub fn stretch(window: &Window<'_>) -> f32 {
+    let (mut scatter, mut degrees) = (0.0, 0_u32);
+    for segment in 0..window.segments() {
+        let (found, groups) = paces(window, segment);
+        scatter += found;
+        degrees += groups;
+    }
+    if degrees < LEAST_GROUPS || scatter > MOST_SCATTER * degrees as f32 {
+        return 0.0;
+    }
+    let arrived: f32 = window.events().map(|event| f32::from(1_u16 << event.weight_log2())).sum();
+    QUEUE_EVENTS / arrived.max(QUEUE_EVENTS)
+}
+
+/// Variance of the time that a group takes over that of a Poisson process, times the degrees of freedom, and these.
+fn paces(window: &Window<'_>, segment: usize) -> (f32, u32) {
+    let events = window.segment(segment);
+    let consecutive = events.iter().take_while(|event| event.weight_log2() == 0).count();
+    let events = &events[..consecutive.min(GROUP * MOST_GROUPS + 1)];
+    let since = |event: &StoredEvent| event.since(window.start_us) as f32;
+    let (mut sum, mut squares, mut count) = (0.0, 0.0, 0_u32);
+    for (early, late) in events.iter().zip(events.iter().skip(GROUP)).step_by(GROUP) {
+        let time_us = since(late) - since(early);
+        sum += time_us;
+        squares += time_us * time_us;
+        count += 1;
+    }
+    let mean = sum / (count as f32).max(1.0);
+    if count < 2 || mean <= 0.0 {
+        return (0.0, 0);
+    }
+    let degrees = count - 1;
+    let variance_us2 = squares - mean * sum - ROUNDING_US2 * degrees as f32;
+    (variance_us2.max(0.0) * GROUP as f32 / (mean * mean), degrees)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::event::{PackedEvent, Polarity};
+    use crate::store::{SEGMENTS, Store};
+
+    /// The stretch of a window of events whose distances are told in nanoseconds.
+    fn of(distance_ns: impl Fn(u64) -> u64) -> f32 {
+        let mut memory = vec![StoredEvent::default(); SEGMENTS * 2_048];
+        let mut store = Store::new(&mut memory, 25_000);
+        let mut t_ns = 0;
+        for index in 0_u64.. {
+            t_ns += distance_ns(index);
+            let t_us = t_ns / 1_000;
+            if t_us >= 150_000 {
+                break;
+            }
+            while t_us >= store.open_end_us() {
+                store.close_segment();
+            }
+            store.push(&[PackedEvent::new(t_us as u32, 1, 1, Polarity::On)]);
+        }
+        stretch(&store.window(6, u64::MAX))
+    }
+
+    /// Exponentially distributed with a mean of one, from a hash.
+    fn random(index: u64) -> f32 {
+        let mixed = (index + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        let mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let hash = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB) >> 40;
+        -libm::logf((hash as f32 + 0.5) / (1 << 24) as f32)
+    }
+
+    #[test]
+    fn a_clocked_readout_is_told_from_random_events_at_any_pace() {
+        for pace_ns in [200, 1_000, 20_000] {
+            assert!(of(|_| pace_ns) > 0.0, "{pace_ns} ns");
+            assert!(of(|index| (random(index) * pace_ns as f32) as u64) == 0.0, "{pace_ns} ns");
+        }
+    }
+
+    #[test]
+    fn the_stretch_is_the_queue_over_the_events() {
+        let found = of(|_| 1_000);
+        assert!((found / (4_096.0 / 150_000.0) - 1.0).abs() < 0.05, "{found}");
+    }
+}

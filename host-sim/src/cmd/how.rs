@@ -1,0 +1,79 @@
+//! How a recording is to be measured: what `measure` and `plot` let a person say.
+
+use std::path::Path;
+
+use anyhow::Context;
+use evtach_core::{Geometry, Roi, Settings};
+use evtach_host::measure::Capacity;
+use evtach_host::recording::{self, OpenOptions, Recording};
+
+/// What is known better than the tachometer finds it, and the memory it is given.
+#[derive(clap::Args)]
+pub struct How {
+    /// Blade count, when it is known.
+    #[arg(long, value_parser = clap::value_parser!(u8).range(1..=64))]
+    blades: Option<u8>,
+    /// Look at this part of the sensor only, in pixels.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse_roi)]
+    pub roi: Option<Roi>,
+    /// Fixed window instead of one that adapts to the rotor.
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(5..=2000))]
+    window_ms: Option<u32>,
+    /// Size of the sensor, where the recording does not say it or says it wrong.
+    #[arg(long, value_name = "WxH", value_parser = recording::parse_geometry)]
+    geometry: Option<Geometry>,
+    /// Memory of the tachometer: "device" gives what the device shows, to the bit.
+    #[arg(long, value_enum, default_value = "full")]
+    pub capacity: Capacity,
+    /// One standard deviation of the camera clock's error.
+    #[arg(long, value_name = "PPM", default_value_t = 15.0)]
+    pub clock_ppm: f32,
+}
+
+impl How {
+    /// Opens a recording and says on stderr what was assumed about it.
+    pub fn open(&self, file: &Path) -> anyhow::Result<Recording> {
+        let name = file.display().to_string();
+        let options = OpenOptions { geometry: self.geometry };
+        let recording = recording::open(file, &options).with_context(|| name.clone())?;
+        for assumed in &recording.assumed {
+            eprintln!("{name}: {assumed}");
+        }
+        Ok(recording)
+    }
+
+    /// The tachometer's settings for a sensor of this size.
+    pub fn settings(&self, geometry: Geometry) -> Settings {
+        let mut settings = Settings::new(geometry);
+        settings.roi = self.roi;
+        settings.blades = self.blades;
+        settings.window_us = self.window_ms.map(|ms| ms * 1000);
+        settings.clock_sigma_ppm = self.clock_ppm;
+        settings
+    }
+}
+
+/// A region as people write it: x,y,width,height in pixels.
+pub fn parse_roi(text: &str) -> Result<Roi, String> {
+    let sides: Option<Vec<u16>> = text.split(',').map(|side| side.trim().parse().ok()).collect();
+    match sides.as_deref() {
+        Some(&[x, y, width_px, height_px]) if width_px > 0 && height_px > 0 => {
+            Ok(Roi { x, y, width_px, height_px })
+        }
+        _ => Err(format!("\"{text}\" is no region; write x,y,width,height in pixels")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regions_are_checked() {
+        let whole = Roi { x: 1, y: 2, width_px: 3, height_px: 4 };
+        assert_eq!(parse_roi("1, 2,3,4"), Ok(whole));
+        for text in ["", "1,2,3", "1,2,0,4", "1,2,3,4,5", "-1,2,3,4", "a,2,3,4", "a,1,2,3,4"] {
+            assert!(parse_roi(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! The mean speed of a rotor over a recording, from readings whose windows overlap and leave gaps.
+
+use std::ops::Range;
+
+use evtach_core::{Reading, Speed};
+
+/// Windows that touch overlap by no more than what their middles are rounded by, in microseconds.
+const TOUCH_US: u64 = 2;
+/// Readings follow each other by a third of a window: every third is independent.
+const OVERLAP: f64 = 3.0;
+
+/// The mean speed within one reading's window.
+pub struct Piece {
+    window_us: Range<u64>,
+    speed: Speed,
+}
+
+impl Piece {
+    /// A rotor's speed in a reading.
+    pub fn new(reading: &Reading, speed: Speed) -> Self {
+        let start_us = reading.t_us.saturating_sub(u64::from(reading.window_us) / 2);
+        Self { window_us: start_us..start_us + u64::from(reading.window_us), speed }
+    }
+
+    fn length_us(&self) -> u64 {
+        self.window_us.end - self.window_us.start
+    }
+
+    fn middle_us(&self) -> u64 {
+        self.window_us.start.midpoint(self.window_us.end)
+    }
+
+    fn omega_rad_s(&self) -> f64 {
+        f64::from(self.speed.omega_rad_s)
+    }
+
+    fn variance(&self) -> f64 {
+        f64::from(self.speed.omega_sigma_rad_s).powi(2)
+    }
+}
+
+/// A straight line through all readings; with less than three it is level.
+struct Line {
+    origin_us: u64,
+    t_mean_s: f64,
+    mean_rad_s: f64,
+    slope_rad_s2: f64,
+    /// Sum of the squared distances in time from the mean, in s².
+    tt: f64,
+}
+
+impl Line {
+    fn through(pieces: &[Piece], origin_us: u64) -> Self {
+        let n = pieces.len() as f64;
+        let t_s = |piece: &Piece| seconds(origin_us, piece.middle_us());
+        let t_mean_s = pieces.iter().map(t_s).sum::<f64>() / n;
+        let mean_rad_s = pieces.iter().map(Piece::omega_rad_s).sum::<f64>() / n;
+        let tt: f64 = pieces.iter().map(|p| (t_s(p) - t_mean_s).powi(2)).sum();
+        let ty: f64 =
+            pieces.iter().map(|p| (t_s(p) - t_mean_s) * (p.omega_rad_s() - mean_rad_s)).sum();
+        let slope_rad_s2 = if pieces.len() >= 3 && tt > 0.0 { ty / tt } else { 0.0 };
+        Self { origin_us, t_mean_s, mean_rad_s, slope_rad_s2, tt }
+    }
+
+    fn at(&self, us: u64) -> f64 {
+        self.mean_rad_s + self.slope_rad_s2 * (seconds(self.origin_us, us) - self.t_mean_s)
+    }
+}
+
+/// Mean speed over `span_us` from readings in their order; `None` without any.
+///
+/// A reading is the turn between its window's ends, so windows laid end to end are exact however the speed varies.
+/// What they leave open is filled in from the reading next to it, moved along the line through all, and is as
+/// uncertain as readings scatter about that line.
+pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) -> Option<Speed> {
+    let first = pieces.first()?;
+    let n = pieces.len() as f64;
+    let line = Line::through(pieces, span_us.start);
+    let off = |piece: &Piece| piece.omega_rad_s() - line.at(piece.middle_us());
+    let scatter = pieces.iter().map(|p| off(p).powi(2)).sum::<f64>() / n;
+    let variance = pieces.iter().map(Piece::variance).sum::<f64>() / n;
+
+    let clock = (f64::from(clock_sigma_ppm) * 1e-6 * line.mean_rad_s).powi(2);
+    let (mut whole_s, mut turn_rad, mut turn_variance) = (0.0, 0.0, 0.0);
+    let mut add = |length_s: f64, omega_rad_s: f64, variance: f64| {
+        whole_s += length_s;
+        turn_rad += length_s * omega_rad_s;
+        turn_variance += length_s * length_s * (variance - clock).max(0.0);
+    };
+    let mut reached_us = span_us.start;
+    let tiles = tiles(pieces);
+    let windows = tiles.iter().map(|tile| (tile.window_us.clone(), Some(*tile)));
+    for (window_us, tile) in windows.chain([(span_us.end..span_us.end, None)]) {
+        let open_us = reached_us..window_us.start.max(reached_us);
+        let middle_us = open_us.start.midpoint(open_us.end);
+        if let Some(near) = pieces.iter().min_by_key(|p| p.middle_us().abs_diff(middle_us)) {
+            let length_s = seconds(open_us.start, open_us.end);
+            add(length_s, line.at(middle_us) + off(near), scatter + near.variance());
+        }
+        if let Some(tile) = tile {
+            add(tile.length_us() as f64 * 1e-6, tile.omega_rad_s(), tile.variance());
+        }
+        reached_us = window_us.end;
+    }
+    let sigma_rad_s = (turn_variance / (whole_s * whole_s) + clock).sqrt();
+
+    // A slope is told only where it stands out of the error of the single readings.
+    let told = line.slope_rad_s2.abs() * line.tt.sqrt() > 4.0 * OVERLAP.sqrt() * variance.sqrt();
+    Some(Speed {
+        omega_rad_s: (turn_rad / whole_s) as f32,
+        omega_sigma_rad_s: sigma_rad_s as f32,
+        alpha_rad_s2: told.then_some(line.slope_rad_s2 as f32),
+        frame: first.speed.frame,
+    })
+}
+
+/// Windows that do not overlap and together cover the most, in the order of time.
+fn tiles(pieces: &[Piece]) -> Vec<&Piece> {
+    // Windows end one after the other. `most[i]` is the most that those before the i-th cover, and `from[i]` is how
+    // many come before it where it is one of them.
+    let mut most = vec![0];
+    let mut from = Vec::new();
+    for (i, piece) in pieces.iter().enumerate() {
+        let start_us = piece.window_us.start + TOUCH_US;
+        let before = pieces[..i].partition_point(|earlier| earlier.window_us.end <= start_us);
+        let with = most[before] + piece.length_us();
+        from.push((with > most[i]).then_some(before));
+        most.push(with.max(most[i]));
+    }
+    let mut tiles = Vec::new();
+    let mut left = pieces.len();
+    while let Some(last) = left.checked_sub(1) {
+        left = match from[last] {
+            Some(before) => {
+                tiles.push(&pieces[last]);
+                before
+            }
+            None => last,
+        };
+    }
+    tiles.reverse();
+    tiles
+}
+
+/// The difference is taken in whole microseconds: late times have no exact f64.
+fn seconds(from_us: u64, to_us: u64) -> f64 {
+    to_us.wrapping_sub(from_us).cast_signed() as f64 * 1e-6
+}
+
+#[cfg(test)]
+mod tests {
+    use evtach_core::Frame;
+
+    use super::*;
+
+    /// The mean of readings every 50 ms over 150 ms of a turn that is known at every instant, and its error.
+    fn mean(turn_rad: impl Fn(f64) -> f64, until_ms: u64) -> (f64, f64) {
+        let pieces: Vec<Piece> = (0..)
+            .map(|i| 50 * i..50 * i + 150)
+            .take_while(|window_ms| window_ms.end <= until_ms)
+            .map(|window_ms| {
+                let turned_rad =
+                    turn_rad(window_ms.end as f64 * 1e-3) - turn_rad(window_ms.start as f64 * 1e-3);
+                let speed = Speed {
+                    omega_rad_s: (turned_rad / 0.15) as f32,
+                    omega_sigma_rad_s: 0.01,
+                    alpha_rad_s2: None,
+                    frame: Frame::Camera,
+                };
+                Piece { window_us: window_ms.start * 1000..window_ms.end * 1000, speed }
+            })
+            .collect();
+        let speed = mean_speed(&pieces, &(0..until_ms * 1000), 0.0).expect("readings");
+        (f64::from(speed.omega_rad_s), f64::from(speed.omega_sigma_rad_s))
+    }
+
+    #[test]
+    fn windows_end_to_end_are_exact_for_a_motor_that_hunts() {
+        let turn_rad = |t: f64| 230.0 * t + 0.12 * (20.0 * t).sin();
+        let (mean_rad_s, sigma_rad_s) = mean(turn_rad, 600);
+        assert!((mean_rad_s - turn_rad(0.6) / 0.6).abs() < 1e-3, "{mean_rad_s}");
+        assert!((sigma_rad_s - 0.005).abs() < 1e-4, "{sigma_rad_s}");
+    }
+
+    #[test]
+    fn a_ramp_is_not_cut_short_by_what_no_window_covers() {
+        let turn_rad = |t: f64| 230.0 * t + 5.0 * t * t;
+        let (mean_rad_s, _) = mean(turn_rad, 640);
+        assert!((mean_rad_s - turn_rad(0.64) / 0.64).abs() < 1e-3, "{mean_rad_s}");
+    }
+
+    #[test]
+    fn what_is_filled_in_is_as_uncertain_as_the_speed_varies() {
+        let turn_rad = |t: f64| 230.0 * t + 0.5 * (20.0 * t).sin();
+        let (mean_rad_s, sigma_rad_s) = mean(turn_rad, 440);
+        assert!((mean_rad_s - turn_rad(0.44) / 0.44).abs() < 3.0 * sigma_rad_s);
+        assert!(sigma_rad_s > 0.1, "{sigma_rad_s}");
+    }
+}
