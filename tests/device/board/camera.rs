@@ -1,7 +1,7 @@
 //! What a camera at the port sees, read by the device: the PC's readings to the bit.
 
 use evtach_core::Event;
-use evtach_core::decode::dvxplorer::Dvxplorer;
+use evtach_core::decode::Dvxplorer;
 use evtach_firmware::sensor::usb::emulated::DvxplorerWords;
 use evtach_host::measure::{Capacity, ReadingRow};
 use evtach_host::synth::{Rotor, Scene};
@@ -87,10 +87,8 @@ fn four_rotors() {
     let pc = ReadingRow::new(readings.first().expect("a reading on the PC"), 0);
     assert_eq!(pc.rotors.len(), 4);
     for rotor in &pc.rotors {
-        let device: f64 = board
-            .query(&format!("CONF {};:CALC:AVER:MAX?", rotor.id))
-            .parse()
-            .expect("a speed");
+        let device: f64 =
+            board.query(&format!("CONF {};:CALC:AVER:MAX?", rotor.id)).parse().expect("a speed");
         assert_eq!(Some(device), rotor.rpm, "rotor {}", rotor.id);
     }
     board.assert_sound();
