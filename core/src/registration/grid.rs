@@ -24,14 +24,14 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// No points. A constant, so that it is copied into place instead of being built on the stack.
+    /// No points. All zeros, so that neither flash nor stack holds a copy; sizes of cells come with the points.
     pub const EMPTY: Self = Self {
         starts: [0; CELLS + 1],
         order: [0; SLICE_POINTS],
         places: [[0.0; 3]; SLICE_POINTS],
         metric: Metric { lambda_px_per_s: 0.0, reach_px: 0.0 },
-        cell_px: LEAST_CELL_PX,
-        per_px: 1.0 / LEAST_CELL_PX,
+        cell_px: 0.0,
+        per_px: 0.0,
         half_px: 0.0,
     };
 }
