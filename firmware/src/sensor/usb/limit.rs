@@ -134,13 +134,14 @@ pub(super) struct Governor {
 }
 
 impl Governor {
-    pub fn new(abilities: &Abilities, most_ev_s: u32) -> Self {
+    /// For a camera, behind so many events that came before.
+    pub fn new(abilities: &Abilities, most_ev_s: u32, events: u64) -> Self {
         Self {
             most_ev_s,
             steps: abilities.steps(),
             step: 0,
             since: Instant::now(),
-            from: 0,
+            from: events,
             calm: 0,
         }
     }
@@ -189,9 +190,9 @@ mod tests {
 
     #[test]
     fn more_than_can_be_used_is_left_out_step_by_step_and_let_in_again() {
-        let mut governor = Governor::new(&DAVIS, 1_000_000);
+        let mut governor = Governor::new(&DAVIS, 1_000_000, 5_000_000);
         let mut now = governor.since;
-        let mut events = 0;
+        let mut events = 5_000_000;
         let mut run = |rate_ev_s: u64, windows: u32| -> Vec<(u32, Limit)> {
             (0..windows)
                 .filter_map(|window| {

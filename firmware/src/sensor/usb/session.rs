@@ -91,7 +91,8 @@ struct Found<C, D> {
     camera: Camera,
     abilities: Abilities,
     mounting: Mounting,
-    has_counters: bool,
+    /// What its counter of dropped events said last; `None`: it has none.
+    dropped: Option<u64>,
 }
 
 /// Talks to what was enumerated until it goes, or will not do.
@@ -119,8 +120,9 @@ where
     around.acquired.camera = Some(found.camera);
     around.acquired.trouble = None;
     around.acquired.limit = Limit::NONE;
-    let governor = Governor::new(&found.abilities, around.most_ev_s);
-    let mut reading = Reading { found, stream, governor, dropped: None, counted: Instant::now() };
+    let before = arrived(around.outlet, around.acquired);
+    let governor = Governor::new(&found.abilities, around.most_ev_s, before);
+    let mut reading = Reading { found, stream, governor, counted: Instant::now() };
     let end = reading.read(port, around).await;
     around.acquired.camera = None;
     around.acquired.limit = Limit::NONE;
@@ -177,13 +179,18 @@ async fn find<'d, A: UsbHostAllocator<'d>>(
         Model::Dvxplorer => (false, true),
     };
     let has_counters = ask(&mut registers, HAS_COUNTERS).await? != 0;
+    // A camera that was only reset goes on counting.
+    let dropped = match has_counters {
+        true => Some(registers.read_counter(DROPPED).await.map_err(End::at(DROPPED))?),
+        false => None,
+    };
     Ok(Found {
         registers,
         data,
         camera: Camera { model, geometry },
         abilities: Abilities { model, array, skips, regions },
         mounting: Mounting { swap_xy, flip_gyro_z },
-        has_counters,
+        dropped,
     })
 }
 
@@ -268,9 +275,7 @@ struct Reading<C, D> {
     found: Found<C, D>,
     stream: Stream,
     governor: Governor,
-    /// What the camera's counter of dropped events said last.
-    dropped: Option<u64>,
-    /// When it was asked.
+    /// When the camera was asked what it dropped.
     counted: Instant,
 }
 
@@ -360,17 +365,19 @@ where
     ) -> Result<(), End> {
         let Surroundings { outlet, acquired, .. } = around;
         let now = Instant::now();
-        if self.found.has_counters && now.saturating_duration_since(self.counted) >= COUNTERS {
+        if let Some(before) = self.found.dropped
+            && now.saturating_duration_since(self.counted) >= COUNTERS
+        {
             self.counted = now;
             let dropped =
                 self.found.registers.read_counter(DROPPED).await.map_err(End::at(DROPPED))?;
-            let before = self.dropped.replace(dropped).unwrap_or(0);
+            self.found.dropped = Some(dropped);
             // A counter that steps back began anew.
             let lost = dropped.checked_sub(before).unwrap_or(dropped);
             acquired.lost_by_camera += lost;
             outlet.lost += lost;
         }
-        let events = outlet.delivered.received.saturating_add(acquired.lost_by_camera);
+        let events = arrived(outlet, acquired);
         if let Some(limit) = self.governor.update(now, events) {
             self.found.limit(&limit).await?;
             acquired.limit = limit;
@@ -412,6 +419,11 @@ where
             Err(_) => Ok(()),
         }
     }
+}
+
+/// Events that the camera had to send so far: those that came, and those that its FIFO had no room for.
+const fn arrived<M: RawMutex>(outlet: &Outlet<'_, '_, M>, acquired: &Acquired) -> u64 {
+    outlet.delivered.received.saturating_add(acquired.lost_by_camera)
 }
 
 /// What an event of the port means for a session.

@@ -117,3 +117,25 @@ fn nobody_measures_and_acquiring_goes_on_thinned_and_counted() {
     assert_eq!(acquired.delivered.received, 60_000);
     closes(&heard, &port.0.borrow());
 }
+
+#[test]
+fn what_came_before_counts_neither_for_the_rate_nor_twice_for_the_losses() {
+    // Half of it goes by in a burst that the FIFO cannot hold, then the camera is asked anew without losing power.
+    let mut seen = events(Model::Davis346, 400_000, 100_000_000);
+    let calm = events(Model::Davis346, 200_000, 100_000);
+    seen.extend(calm.into_iter().map(|event| Event { t_us: event.t_us + 5_000, ..event }));
+    let port = World::begin(vec![
+        (0, plug(Camera::new(Model::Davis346, seen))),
+        (1_500, Act::Fail(PipeError::Babble, 6)),
+    ]);
+    let heard = run(&port, 4_500_000, 12_000, |now, world| {
+        world.camera().is_some_and(Camera::is_done) && now.sessions == 2
+    });
+    let world = port.0.borrow();
+    let camera = world.camera().expect("a camera");
+    assert_eq!(heard.acquired.sessions, 2);
+    assert!(camera.dropped > 100_000);
+    assert_eq!((camera.filtered, heard.acquired.limit), (0, Limit::NONE));
+    assert!(heard.acquired.lost_by_camera <= camera.dropped, "{}", heard.acquired);
+    assert!(heard.acquired.seen() <= camera.seen);
+}

@@ -36,6 +36,10 @@ fn a_davis_is_started_in_the_documented_order() {
         (Dvs, 50),
         (Dvs, 40),
         (Mux, 80),
+        // What was dropped before: upper half, lower half, and the upper again.
+        (Mux, 83),
+        (Mux, 84),
+        (Mux, 83),
     ];
     let order = [
         reads(&questions),
@@ -114,7 +118,8 @@ fn filters_and_a_gyro_that_a_davis_lacks_are_left_alone() {
 fn a_dvxplorer_is_started_in_the_documented_order() {
     let chip = |values: &[(u16, u32)]| writes(Chip, values);
     let order = [
-        reads(&[(System, 0), (System, 7), (Dvs, 0), (Dvs, 1), (Dvs, 2), (Imu, 1), (Mux, 80)]),
+        reads(&[(System, 0), (System, 7), (Dvs, 0), (Dvs, 1), (Dvs, 2), (Imu, 1)]),
+        reads(&[(Mux, 80), (Mux, 83), (Mux, 84), (Mux, 83)]),
         writes(Dvs, &[(3, 0)]),
         chip(&[(0x3000, 0)]),
         writes(Imu, &[(2, 0), (3, 0), (4, 0)]),
