@@ -6,6 +6,7 @@ use crate::store::StoredEvent;
 
 /// A rectangle of pixels; events outside are ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Roi {
     /// Left edge in pixels.
     pub x: u16,

@@ -12,7 +12,8 @@ use embassy_usb_driver::host::{DeviceEvent, UsbHostController};
 use embassy_usb_host::{BusController, BusHandle, BusRoute, BusState, bus};
 
 use super::account::Acquired;
-use super::session::{self, Reached, SILENCE, Surroundings, TRANSFER_BYTES};
+use super::found::Reached;
+use super::session::{self, SILENCE, Surroundings, TRANSFER_BYTES};
 use super::trouble::{End, Trouble};
 use crate::intake::Block;
 use crate::sensor::outlet::Outlet;

@@ -10,6 +10,7 @@ mod acquire;
 mod descriptors;
 #[cfg(any(test, feature = "emulated-camera"))]
 pub mod emulated;
+mod found;
 mod limit;
 mod model;
 mod registers;
