@@ -116,7 +116,7 @@ step_deny() {
   fi
   cargo deny check bans licenses sources
   # The emulated board has its own rules: its processor is GPL-2.0.
-  cargo deny --manifest-path tests/board/Cargo.toml check --config tests/board/deny.toml bans licenses sources
+  cargo deny --manifest-path tests/board/Cargo.toml --config tests/board/deny.toml check bans licenses sources
   # The database of advisories lies on GitHub, out of reach of some machines. That it cannot be
   # fetched is no finding; what it says is.
   if cargo deny fetch db 2>/dev/null; then

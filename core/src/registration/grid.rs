@@ -24,8 +24,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// No points, to be built before it is asked. A constant, so that it is not built on the stack, and all zeros, so that the
-    /// flash holds no copy.
+    /// No points. All zeros, so that neither flash nor stack holds a copy; sizes of cells come with the points.
     pub const EMPTY: Self = Self {
         starts: [0; CELLS + 1],
         order: [0; SLICE_POINTS],

@@ -246,7 +246,11 @@ impl Instrument {
 
     /// Takes in a reading; while the screen is held, it goes into max, min, mean, revolutions and alarm only.
     pub fn observe(&mut self, reading: &Reading) {
-        let mut reading = reading.clone();
+        self.take_in(reading.clone());
+    }
+
+    /// The same, of a reading that nobody else needs: it is a kilobyte and more, and stacks are short.
+    pub fn take_in(&mut self, mut reading: Reading) {
         let trim = 1.0 + self.preferences.clock_trim_ppm * 1e-6;
         for speed in reading.rotors.iter_mut().filter_map(|rotor| rotor.speed.as_mut()) {
             // A clock that runs fast counts too many microseconds a turn.

@@ -124,7 +124,7 @@ impl<R: Recording, P: Panel> Front<R, P> {
             Traffic { events: standing.received, lost: standing.lost },
         );
         while let Ok(reading) = self.shared.readings.try_receive() {
-            self.instrument.observe(&reading);
+            self.instrument.take_in(reading);
         }
         if let Ok(picture) = self.shared.taken.try_receive() {
             self.instrument.show_picture(picture);

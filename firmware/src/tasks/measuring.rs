@@ -22,17 +22,21 @@ impl<R: FnMut(&Block)> Measuring<R> {
     }
 }
 
+// None is inlined: their temporaries, a reading or two, are not to lie on the stack below the measurement.
 impl<R: FnMut(&Block)> Companion for Measuring<R> {
+    #[inline(never)]
     fn arrived(&mut self, block: &Block) {
         (self.record)(block);
     }
 
+    #[inline(never)]
     fn measured(&mut self, reading: &Reading, _: Spent) {
         if self.shared.readings.try_send(reading.clone()).is_err() {
             self.shared.dropped.fetch_add(1, Ordering::Relaxed);
         }
     }
 
+    #[inline(never)]
     fn between(&mut self, tachometer: &mut Tachometer<'_>) {
         self.shared.alive(Task::Measure);
         if let Some(Wanted { blades, roi, window_us }) = self.shared.take_wanted() {

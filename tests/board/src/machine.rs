@@ -4,36 +4,23 @@ use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 use anyhow::{Result, anyhow, bail};
-use unicorn_engine::unicorn_const::{Arch, HookType, MemType, Mode, Permission};
+use unicorn_engine::unicorn_const::{Arch, HookType, MemType, Mode};
 use unicorn_engine::{ArmCpuModel, RegisterARM as R, Unicorn, uc_error};
 
-use crate::board::{Board, n25q};
-use crate::chip::Memory;
+use crate::board::Board;
 use crate::chip::ltdc::Picture;
 use crate::chip::rcc::Cause;
 use crate::cpu::{self, Engine, nvic};
 use crate::image::{FLASH, FLASH_BYTES, Image, instructions};
 use crate::injury::Injury;
+use crate::memories::{Memories, Ram};
 use crate::rtt::Rtt;
 use crate::time::{MS, NEVER, Pulse, S};
 
-/// Internal RAM.
-const RAM: u32 = 0x2000_0000;
-const RAM_BYTES: usize = 320 << 10;
-const ITCM_BYTES: usize = 16 << 10;
-const SDRAM: u32 = 0xc000_0000;
-const SDRAM_BYTES: usize = 8 << 20;
-/// Where the serial flash is read as memory.
-const MAPPED: u32 = 0x9000_0000;
-/// Identity of the chip and size of its flash.
-const SYSTEM_MEMORY: u64 = 0x1ff0_0000;
 /// Address that no code ever reaches.
 const NOWHERE: u64 = 0xdead_beee;
 /// How often the log is read.
 const PROBE_PS: u64 = MS;
-/// What RAM holds when power comes, so that nobody relies on zeros.
-const POWER_ON: u8 = 0xa5;
-
 const WFE: u16 = 0xbf20;
 const WFI: u16 = 0xbf30;
 const SEV: u16 = 0xbf40;
@@ -76,19 +63,6 @@ enum Cut {
     At(u64),
 }
 
-/// The engine's memory as another bus master sees it.
-struct Ram<'a>(&'a mut Engine);
-
-impl Memory for Ram<'_> {
-    fn read(&self, at: u32, bytes: &mut [u8]) -> bool {
-        self.0.mem_read(u64::from(at), bytes).is_ok()
-    }
-
-    fn write(&mut self, at: u32, bytes: &[u8]) -> bool {
-        self.0.mem_write(u64::from(at), bytes).is_ok()
-    }
-}
-
 /// A running device.
 pub struct Machine {
     engine: Engine,
@@ -104,16 +78,13 @@ pub struct Machine {
     event: Rc<Cell<bool>>,
     sleep: Sleep,
     next_probe: u64,
-    sdram_on: bool,
-    mapped: bool,
+    memories: Memories,
     /// Resets so far, with their causes.
     pub resets: Vec<Cause>,
     /// Faults of the processor, told with symbols.
     pub faults: Vec<String>,
     /// Exceptions entered.
     pub entered: u64,
-    /// A word of SDRAM with a bit that reads as zero.
-    broken_word: Rc<Cell<Option<u32>>>,
     /// Time spent asleep.
     pub slept: u64,
     /// Power goes in the middle of the next write to the serial flash; then it knows when.
@@ -134,20 +105,7 @@ impl Machine {
         let (image, pulse) = (Rc::new(image), Rc::new(Pulse::default()));
         let board = Rc::new(RefCell::new(Board::new(Rc::clone(&pulse))));
         let (stop, event) = (Rc::new(Cell::new(Stop::Plain)), Rc::new(Cell::new(false)));
-        let broken_word = Rc::new(Cell::new(None));
-
-        let map = |engine: &mut Engine, at: u32, bytes: usize, permission| {
-            engine.mem_map(u64::from(at), bytes, permission)
-        };
-        map(&mut engine, 0, ITCM_BYTES, Permission::ALL).map_err(failed)?;
-        map(&mut engine, FLASH, FLASH_BYTES, Permission::READ | Permission::EXEC)
-            .map_err(failed)?;
-        map(&mut engine, RAM, RAM_BYTES, Permission::ALL).map_err(failed)?;
-        engine.mem_map(SYSTEM_MEMORY, 0x1_0000, Permission::READ).map_err(failed)?;
-        engine.mem_write(u64::from(FLASH), &image.flash).map_err(failed)?;
-        let identity = *b"EVTACHBOARD1";
-        engine.mem_write(SYSTEM_MEMORY + 0xf420, &identity).map_err(failed)?;
-        engine.mem_write(SYSTEM_MEMORY + 0xf442, &1024_u16.to_le_bytes()).map_err(failed)?;
+        let memories = Memories::new(&mut engine, &image.flash).map_err(failed)?;
         for (start, bytes) in [
             (0x4000_0000_u32, 0x8_0000),
             (0x5000_0000, 0x8_0000),
@@ -180,18 +138,15 @@ impl Machine {
             event,
             sleep: Sleep::Awake,
             next_probe: 0,
-            sdram_on: false,
-            mapped: false,
+            memories,
             resets: Vec::new(),
             faults: Vec::new(),
             entered: 0,
-            broken_word,
             slept: 0,
             cut: Cut::None,
             injury: None,
         };
         machine.hook().map_err(failed)?;
-        machine.lose_memory();
         machine.reset(Cause::Power)?;
         Ok(machine)
     }
@@ -259,65 +214,20 @@ impl Machine {
         Ok(())
     }
 
-    /// RAM holds nothing of use after power comes.
-    fn lose_memory(&mut self) {
-        let _ = self.engine.mem_write(u64::from(RAM), &vec![POWER_ON; RAM_BYTES]);
-        if self.sdram_on {
-            let _ = self.engine.mem_write(u64::from(SDRAM), &vec![POWER_ON; SDRAM_BYTES]);
-        }
-    }
-
     fn reset(&mut self, cause: Cause) -> Result<()> {
         self.drain_log();
+        let failed = |error: uc_error| anyhow!("the engine: {error:?}");
         if cause == Cause::Power {
-            self.lose_memory();
+            self.memories.lose(&mut self.engine).map_err(failed)?;
         }
         self.board.borrow_mut().reset(cause, FLASH);
-        if self.sdram_on {
-            // It answers again once it has been started again; what is in it is kept by its own refresh or not at all.
-            self.map_sdram(false);
-        }
+        // The SDRAM answers again once it has been started again.
+        self.follow_controllers()?;
         self.sleep = Sleep::Awake;
         self.event.set(false);
         self.pulse.level.set(0);
         self.resets.push(cause);
         cpu::reset(&mut self.engine, FLASH).map_err(|error| anyhow!("no vectors: {error:?}"))
-    }
-
-    fn map_sdram(&mut self, on: bool) {
-        let at = u64::from(SDRAM);
-        if on {
-            let _ = self.engine.mem_map(at, SDRAM_BYTES, Permission::READ | Permission::WRITE);
-            let _ = self.engine.mem_write(at, &vec![POWER_ON; SDRAM_BYTES]);
-        } else {
-            let _ = self.engine.mem_unmap(at, SDRAM_BYTES);
-        }
-        self.sdram_on = on;
-    }
-
-    /// A bit of SDRAM that reads as zero from now on.
-    ///
-    /// # Errors
-    /// When the engine takes no more hooks.
-    pub fn break_sdram(&mut self, offset: u32) -> Result<()> {
-        let at = SDRAM + (offset & !3);
-        let first = self.broken_word.replace(Some(at)).is_none();
-        if !first {
-            bail!("one word is broken already");
-        }
-        let hook = move |engine: &mut Unicorn<'_, ()>, _: MemType, _: u64, _: usize, _: i64| {
-            let mut word = [0; 4];
-            if engine.mem_read(u64::from(at), &mut word).is_ok() {
-                word[1] &= !0x10;
-                let _ = engine.mem_write(u64::from(at), &word);
-            }
-            true
-        };
-        self.engine
-            .add_mem_hook(HookType::MEM_READ, u64::from(at), u64::from(at) + 3, hook)
-            // What was translated before reads past the hook.
-            .and_then(|_| self.engine.ctl_flush_tb())
-            .map_err(|error| anyhow!("the engine: {error:?}"))
     }
 
     /// Power goes in the middle of the next write to the serial flash.
@@ -377,7 +287,7 @@ impl Machine {
         if let Some(cause) = asked {
             return self.reset(cause);
         }
-        self.map_memories();
+        self.follow_controllers()?;
         let first = self.board.borrow().nvic.preempting();
         if let Some((exception, priority)) = first {
             if self.sleep == Sleep::Interrupt {
@@ -397,29 +307,18 @@ impl Machine {
         Ok(())
     }
 
-    /// Memories that come and go with their controllers.
-    fn map_memories(&mut self) {
-        let (sdram, mapped, changed) = {
-            let mut board = self.board.borrow_mut();
-            let changed = std::mem::take(&mut board.quadspi.changed);
-            (board.fmc.is_ready(), board.quadspi.is_mapped(), changed)
-        };
-        if sdram != self.sdram_on {
-            self.map_sdram(sdram);
-        }
-        let at = u64::from(MAPPED);
-        if mapped != self.mapped {
-            if mapped {
-                let _ = self.engine.mem_map(at, n25q::BYTES, Permission::READ);
-            } else {
-                let _ = self.engine.mem_unmap(at, n25q::BYTES);
-            }
-        }
-        if mapped && (changed || !self.mapped) {
-            let board = self.board.borrow();
-            let _ = self.engine.mem_write(at, &board.quadspi.flash.cells);
-        }
-        self.mapped = mapped;
+    fn follow_controllers(&mut self) -> Result<()> {
+        self.memories
+            .follow(&mut self.engine, &mut self.board.borrow_mut())
+            .map_err(|error| anyhow!("the engine: {error:?}"))
+    }
+
+    /// A bit of SDRAM that reads as zero from now on.
+    ///
+    /// # Errors
+    /// When one is broken already, or the engine takes no more hooks.
+    pub fn break_sdram(&mut self, offset: u32) -> Result<()> {
+        self.memories.break_sdram(&mut self.engine, offset)
     }
 
     fn enter(&mut self, exception: u16) {

@@ -15,6 +15,7 @@ mod image;
 mod injury;
 mod live;
 mod machine;
+mod memories;
 mod rtt;
 mod script;
 mod time;

@@ -158,8 +158,10 @@ impl Script {
                 board.disturbed();
             }
             "flash" => {
-                let (at, path) = rest.split_once(' ').ok_or_else(|| anyhow!("flash OFFSET FILE"))?;
-                let (at, bytes): (usize, _) = (number(at)?, std::fs::read(path).with_context(|| path.to_owned())?);
+                let (at, path) =
+                    rest.split_once(' ').ok_or_else(|| anyhow!("flash OFFSET FILE"))?;
+                let (at, bytes): (usize, _) =
+                    (number(at)?, std::fs::read(path).with_context(|| path.to_owned())?);
                 let mut board = self.machine.board.borrow_mut();
                 let cells = board.quadspi.flash.cells.get_mut(at..at + bytes.len());
                 cells.ok_or_else(|| anyhow!("{path} does not fit"))?.copy_from_slice(&bytes);

@@ -76,11 +76,6 @@ fn programs() -> Option<&'static (PathBuf, PathBuf)> {
     programs.as_ref()
 }
 
-/// Path of the image that is flashed.
-pub fn image() -> Option<&'static Path> {
-    programs().map(|(_, image)| image.as_path())
-}
-
 impl Board {
     /// Gives a device power. None, with the reason shown, where the emulator cannot be built.
     pub fn switch_on() -> Option<Self> {

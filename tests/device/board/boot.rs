@@ -45,11 +45,11 @@ fn boots_draws_and_answers() {
 
 #[test]
 fn ten_runs_are_one() {
-    let mut first = None;
+    let (mut first, sees) = (None, crate::one_rotor(1500.0, 200.0));
     for _ in 0..10 {
         let Some(mut board) = Board::switch_on() else { return };
         board.run(0.3);
-        board.plug_camera(crate::board::Camera::Davis346, &crate::one_rotor(1500.0, 200.0));
+        board.plug_camera(crate::board::Camera::Davis346, &sees);
         board.run(1.0);
         let this = (board.report().to_string(), board.defmt_log(), board.lcd());
         let first = first.get_or_insert_with(|| this.clone());

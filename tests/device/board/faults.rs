@@ -108,8 +108,11 @@ fn far_more_events_than_the_port_carries() {
     board.run(1.2);
     let camera = board.camera();
     assert_eq!(camera["seen"].as_u64(), Some(per_s as u64), "{camera}");
-    // The camera's own filters leave out what the device could not use, and it answers all the while.
-    assert!(camera["filtered"].as_u64() > Some(per_s as u64 / 2), "{camera}");
+    // The camera's own filters leave out most of what the device could not use, its FIFO drops the rest, both count, and
+    // the device answers all the while.
+    let (filtered, dropped) = (camera["filtered"].as_u64(), camera["dropped"].as_u64());
+    assert!(filtered > Some(per_s as u64 / 3), "{camera}");
+    assert!(dropped < Some(per_s as u64 / 4), "{camera}");
     assert!(board.query("*IDN?").starts_with("EV-Tach"));
     board.assert_sound();
 }

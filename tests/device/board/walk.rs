@@ -2,20 +2,23 @@
 
 use std::path::Path;
 
+use evtach_core::Geometry;
 use evtach_core::limits::DEVICE_HEAT_CELLS;
 use evtach_core::rotors::HeatMap;
 use evtach_firmware::instrument::{Action, Instrument, Page, Picture, Preferences};
 use evtach_firmware::ui::{Press, action_at, button};
 use evtach_host::frame::Frame;
 
-use crate::DAVIS346;
 use crate::board::Board;
 use crate::boot::{differing, drawn};
+
+/// The sensor that the measurement is set up for until it knows better.
+const BEFORE: Geometry = Geometry { width_px: 320, height_px: 320 };
 
 /// What the measurement hands out before the first event.
 pub fn empty_picture() -> Picture {
     let (mut counts, mut picture) = ([0; DEVICE_HEAT_CELLS], Picture::EMPTY);
-    picture.take(&HeatMap::new(&mut counts, DAVIS346));
+    picture.take(&HeatMap::new(&mut counts, BEFORE));
     picture
 }
 
