@@ -1,20 +1,16 @@
 //! Prophesee EVT 2.0: one event in a 32-bit word.
 
+use super::high::HighClock;
 use super::polarity;
 use crate::event::{Event, PackedEvent};
 
-/// Bits of the TIME_HIGH counter, which counts steps of 64 us: it wraps after 2^34 us (4.8 hours).
-const HIGH_BITS: u32 = 28;
-const LOW_BITS: u32 = 6;
+/// Bits above them tell what a word is.
+const PAYLOAD_BITS: u32 = 28;
 
 /// Decoder of EVT 2.0 words (Prophesee, "EVT 2.0 format").
 #[derive(Clone, Debug, Default)]
 pub struct Evt2 {
-    /// Time of the last TIME_HIGH word in microseconds, wraps included.
-    base_us: u64,
-    /// Payload of the last TIME_HIGH word.
-    high: Option<u32>,
-    wraps: u32,
+    clock: HighClock,
     untimed: u64,
     unknown: u64,
 }
@@ -23,27 +19,27 @@ impl Evt2 {
     /// A decoder at the start of a stream.
     #[must_use]
     pub const fn new() -> Self {
-        Self { base_us: 0, high: None, wraps: 0, untimed: 0, unknown: 0 }
+        Self { clock: HighClock::new(), untimed: 0, unknown: 0 }
     }
 
     /// Takes in one word and hands out the event in it, if any.
     #[inline]
     pub fn decode(&mut self, word: u32, mut emit: impl FnMut(Event)) {
-        let kind = word >> HIGH_BITS;
+        let kind = word >> PAYLOAD_BITS;
         match kind {
             0x0 | 0x1 => {
-                if self.high.is_none() {
+                let Some(base_us) = self.clock.base_us() else {
                     self.untimed += 1;
                     return;
-                }
+                };
                 emit(Event {
-                    t_us: self.base_us | u64::from((word >> 22) & 0x3f),
+                    t_us: base_us | u64::from((word >> 22) & 0x3f),
                     x: ((word >> 11) & 0x7ff) as u16,
                     y: (word & 0x7ff) as u16,
                     polarity: polarity(kind == 1),
                 });
             }
-            0x8 => self.time_high(word & 0x0fff_ffff),
+            0x8 => self.clock.set(word & 0x0fff_ffff),
             // Triggers and the vendor's own words carry no pixel.
             0xa | 0xe | 0xf => {}
             _ => self.unknown += 1,
@@ -56,8 +52,8 @@ impl Evt2 {
         let (mut taken, mut filled) = (0, 0);
         loop {
             // Nearly all words are events, and all that they need stays the same up to the next time.
-            if self.high.is_some() {
-                let run = pack_run(&words[taken..], &mut places[filled..], self.base_us as u32);
+            if let Some(base_us) = self.clock.base_us() {
+                let run = pack_run(&words[taken..], &mut places[filled..], base_us as u32);
                 taken += run;
                 filled += run;
             }
@@ -72,20 +68,10 @@ impl Evt2 {
         }
     }
 
-    fn time_high(&mut self, high: u32) {
-        // Only a jump back by more than half the range is the counter's wrap; less is a stream out of order.
-        if self.high.is_some_and(|before| before > high && before - high > 1 << (HIGH_BITS - 1)) {
-            self.wraps += 1;
-        }
-        self.high = Some(high);
-        self.base_us =
-            (u64::from(self.wraps) << (HIGH_BITS + LOW_BITS)) | (u64::from(high) << LOW_BITS);
-    }
-
     /// Times the wire's clock wrapped.
     #[must_use]
     pub const fn wraps(&self) -> u32 {
-        self.wraps
+        self.clock.wraps()
     }
 
     /// Events dropped because no time word had come yet.
@@ -127,13 +113,13 @@ fn pack_run(words: &[[u8; 4]], places: &mut [PackedEvent], base_us: u32) -> usiz
 /// Whether a word is an event, or all of several whose bits it holds are.
 #[inline(always)]
 const fn is_event(word: u32) -> bool {
-    word < 2 << HIGH_BITS
+    word < 2 << PAYLOAD_BITS
 }
 
 #[inline(always)]
 const fn pack(word: u32, base_us: u32) -> PackedEvent {
     let (x, y) = ((word >> 11 & 0x7ff) as u16, (word & 0x7ff) as u16);
-    PackedEvent::new(base_us | word >> 22 & 0x3f, x, y, polarity(word >> HIGH_BITS != 0))
+    PackedEvent::new(base_us | word >> 22 & 0x3f, x, y, polarity(word >> PAYLOAD_BITS != 0))
 }
 
 #[cfg(test)]

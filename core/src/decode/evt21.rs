@@ -1,21 +1,14 @@
 //! Prophesee EVT 2.1: 32 neighbouring pixels in a 64-bit word.
 
+use super::high::HighClock;
 use super::polarity;
 use crate::event::Event;
-
-/// Bits of the TIME_HIGH counter, which counts steps of 64 us: it wraps after 2^34 us (4.8 hours).
-const HIGH_BITS: u32 = 28;
-const LOW_BITS: u32 = 6;
 
 /// Decoder of EVT 2.1 words (Prophesee, "EVT 2.1 format"). Sensors of the IMX636 generation send the upper half of a
 /// word first ("legacy" byte order); turning it round is the caller's part.
 #[derive(Clone, Debug, Default)]
 pub struct Evt21 {
-    /// Time of the last TIME_HIGH word in microseconds, wraps included.
-    base_us: u64,
-    /// Payload of the last TIME_HIGH word.
-    high: Option<u32>,
-    wraps: u32,
+    clock: HighClock,
     untimed: u64,
     unknown: u64,
 }
@@ -24,7 +17,7 @@ impl Evt21 {
     /// A decoder at the start of a stream.
     #[must_use]
     pub const fn new() -> Self {
-        Self { base_us: 0, high: None, wraps: 0, untimed: 0, unknown: 0 }
+        Self { clock: HighClock::new(), untimed: 0, unknown: 0 }
     }
 
     /// Takes in one word and hands out its events, up to 32.
@@ -34,11 +27,11 @@ impl Evt21 {
         match kind {
             0x0 | 0x1 => {
                 let mut mask = word as u32;
-                if self.high.is_none() {
+                let Some(base_us) = self.clock.base_us() else {
                     self.untimed += u64::from(mask.count_ones());
                     return;
-                }
-                let t_us = self.base_us | (word >> 54) & 0x3f;
+                };
+                let t_us = base_us | (word >> 54) & 0x3f;
                 let base_x = ((word >> 43) & 0x7ff) as u16;
                 let y = ((word >> 32) & 0x7ff) as u16;
                 while mask != 0 {
@@ -47,27 +40,17 @@ impl Evt21 {
                     mask &= mask - 1;
                 }
             }
-            0x8 => self.time_high((word >> 32) as u32 & 0x0fff_ffff),
+            0x8 => self.clock.set((word >> 32) as u32 & 0x0fff_ffff),
             // Triggers and the vendor's own words carry no pixel.
             0xa | 0xe | 0xf => {}
             _ => self.unknown += 1,
         }
     }
 
-    fn time_high(&mut self, high: u32) {
-        // Only a jump back by more than half the range is the counter's wrap; less is a stream out of order.
-        if self.high.is_some_and(|before| before > high && before - high > 1 << (HIGH_BITS - 1)) {
-            self.wraps += 1;
-        }
-        self.high = Some(high);
-        self.base_us =
-            (u64::from(self.wraps) << (HIGH_BITS + LOW_BITS)) | (u64::from(high) << LOW_BITS);
-    }
-
     /// Times the wire's clock wrapped.
     #[must_use]
     pub const fn wraps(&self) -> u32 {
-        self.wraps
+        self.clock.wraps()
     }
 
     /// Events dropped because no time word had come yet.

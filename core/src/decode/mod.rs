@@ -8,6 +8,7 @@ mod dvxplorer;
 mod evt2;
 mod evt21;
 mod evt3;
+mod high;
 mod inivation;
 
 pub use davis::{Davis, Mounting};

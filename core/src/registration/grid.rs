@@ -24,7 +24,8 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// No points. All zeros, so that neither flash nor stack holds a copy; sizes of cells come with the points.
+    /// No points, to be built before it is asked. A constant, so that it is not built on the stack, and all zeros, so that the
+    /// flash holds no copy.
     pub const EMPTY: Self = Self {
         starts: [0; CELLS + 1],
         order: [0; SLICE_POINTS],

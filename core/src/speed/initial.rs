@@ -10,6 +10,7 @@
 use heapless::Vec;
 
 use super::path::{Moving, Path};
+use crate::order::sort_few;
 use crate::registration::{Icp, Progress, Registered, Residual, Slice, SlicePoint};
 use crate::rotors::Disc;
 use crate::store::{WINDOW_SEGMENTS, Window};
@@ -178,14 +179,7 @@ fn take(
 /// The median of values, which it sorts.
 #[must_use]
 pub fn median(values: &mut [f32]) -> Option<f32> {
-    // Few values: an insertion sort is a hundredth of the library's code.
-    for sorted in 1..values.len() {
-        let mut at = sorted;
-        while at > 0 && values[at - 1] > values[at] {
-            values.swap(at - 1, at);
-            at -= 1;
-        }
-    }
+    sort_few(values, |a, b| a < b);
     let middle = values.len() / 2;
     if values.len() % 2 == 1 {
         values.get(middle).copied()

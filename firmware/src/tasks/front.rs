@@ -134,7 +134,7 @@ impl<R: Recording, P: Panel> Front<R, P> {
         let wanted = Wanted { blades: self.instrument.preferences().blades, roi, window_us };
         if wanted != self.told {
             self.told = wanted;
-            self.shared.wanted.signal(wanted);
+            self.shared.want(wanted);
         }
     }
 

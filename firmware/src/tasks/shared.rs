@@ -58,7 +58,8 @@ pub struct Shared {
     standing: Mutex<CriticalSectionRawMutex, Cell<Standing>>,
     pub(super) readings: Channel<CriticalSectionRawMutex, Reading, READINGS>,
     pub(super) dropped: AtomicU32,
-    pub(super) wanted: Signal<CriticalSectionRawMutex, Wanted>,
+    /// The last that was asked for. No `Signal`: that is not all zeros at the start, and would have the flash hold a copy of all this.
+    wanted: Channel<CriticalSectionRawMutex, Wanted, 1>,
     /// A picture to be taken, and one that has been.
     pub(super) blank: Channel<CriticalSectionRawMutex, &'static mut Picture, 1>,
     pub(super) taken: Channel<CriticalSectionRawMutex, &'static mut Picture, 1>,
@@ -81,7 +82,7 @@ impl Shared {
             standing: Mutex::new(Cell::new(Standing::NONE)),
             readings: Channel::new(),
             dropped: AtomicU32::new(0),
-            wanted: Signal::new(),
+            wanted: Channel::new(),
             blank: Channel::new(),
             taken: Channel::new(),
             touched: Signal::new(),
@@ -92,6 +93,17 @@ impl Shared {
     /// Lends the memory of the picture that goes back and forth between measuring and showing.
     pub fn lend(&self, picture: &'static mut Picture) {
         self.blank.try_send(picture).ok();
+    }
+
+    /// What the measurement is to look at from now on, whatever was asked before.
+    pub(super) fn want(&self, wanted: Wanted) {
+        self.wanted.clear();
+        self.wanted.try_send(wanted).ok();
+    }
+
+    /// What the measurement is to look at, when that is new.
+    pub(super) fn take_wanted(&self) -> Option<Wanted> {
+        self.wanted.try_receive().ok()
     }
 
     /// How acquisition stands: told by the acquiring task, which is alive then.

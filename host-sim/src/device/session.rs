@@ -1,5 +1,6 @@
 //! The firmware as an instrument in QEMU, spoken to over its serial port.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
@@ -206,6 +207,8 @@ pub struct Used {
     pub instructions: Vec<(String, u64)>,
     /// Readings told over the link.
     pub readings: u32,
+    /// Of these, how many held a speed of each rotor, in the order of their letters.
+    pub of_rotors: Vec<u32>,
     /// Deepest stack while the program started, in bytes.
     pub stack_starting: u64,
     /// Deepest stack since, in bytes.
@@ -234,7 +237,18 @@ pub fn run_instrument(image: &Image, stream: &[u8], seconds: u32) -> Result<Used
         stdout.read_to_string(&mut said).map_err(failed)?;
     }
     let mut used = Used { seconds, ..Used::default() };
-    used.readings = told.lines().filter(|line| line.starts_with('{')).count() as u32;
+    let mut of_rotors = BTreeMap::<String, u32>::new();
+    for line in told.lines().filter(|line| line.starts_with('{')) {
+        used.readings += 1;
+        // The last line may be cut.
+        let reading = serde_json::from_str::<serde_json::Value>(line).unwrap_or_default();
+        for rotor in reading["rotors"].as_array().into_iter().flatten() {
+            if let Some(id) = rotor["id"].as_str().filter(|_| rotor["rpm"].is_number()) {
+                *of_rotors.entry(id.to_owned()).or_default() += 1;
+            }
+        }
+    }
+    used.of_rotors = of_rotors.into_values().collect();
     for (index, line) in said.lines().enumerate() {
         let number = |key: &str| {
             let word = line.split(' ').find_map(|word| word.strip_prefix(key)?.strip_prefix('='));

@@ -1,6 +1,7 @@
 //! The verdict on a rotor: what the witnesses say together, and how sure they are.
 
 use super::super::baseline::Estimate;
+use super::baselines::FRACTION;
 use super::{Measurement, Stated};
 use crate::math::{TAU, sqrt};
 use crate::reading::{Reason, Status};
@@ -18,7 +19,8 @@ const MOST_JITTER_S: f32 = 150e-6;
 /// Blur that a jitter of one pixel makes as the pose measures it, where the harmonic rises by doubling: up to half an octave
 /// past the best, where 1 / (m exp(-m^2 / 2)) is 1.9.
 const BLUR_OF_JITTER: f32 = 1.9;
-/// Farthest deviation of the fractional-baseline test, as a share of the angle of symmetry.
+/// Farthest deviation of the fractional-baseline test, as a share of the angle of symmetry; or half of what a speed by one
+/// winding more would show, where that is more: this fraction of the difference of the two angles.
 const MOST_DEVIATION: f32 = 0.03;
 /// Witnesses of the lock may differ by this much, or by eight standard errors.
 const LOCK_AGREEMENT: f32 = 2e-3;
@@ -64,7 +66,8 @@ impl Measurement {
             // Where the parts were not counted, they are at least as many as the windings of the line.
             let parts = if self.parts.is_none() { self.windings.max(1) } else { 1 };
             let deviation = self.evidence.fractional_deviation.map(|d| d * parts as f32);
-            let whole = deviation.is_some_and(|d| d < MOST_DEVIATION);
+            let half_way = 0.5 * FRACTION / (self.windings as f32 + 1.0);
+            let whole = deviation.is_some_and(|d| d < half_way.max(MOST_DEVIATION));
             let both = combine(lock, phase);
             let sharp = both.sigma_rad_s.max(held_up * both.omega_rad_s.abs())
                 < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
@@ -125,8 +128,7 @@ impl Measurement {
         if self.in_doubt() {
             return false;
         }
-        let most_px = self.blur_px(MOST_BLUR).max(self.pose.least_blur_px());
-        self.pose.blur_px() < most_px
+        self.pose.blur_px() < self.blur_px(MOST_BLUR)
     }
 
     /// Whether the edges are so sharp that a registration that went astray does not count against them.
