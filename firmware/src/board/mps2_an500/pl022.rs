@@ -62,7 +62,14 @@ impl Pl022 {
     #[inline(always)]
     fn receive(places: &mut [u8; FIFO_BYTES]) {
         let ask = || DATA.write(0);
-        (ask(), ask(), ask(), ask(), ask(), ask(), ask(), ask());
+        ask();
+        ask();
+        ask();
+        ask();
+        ask();
+        ask();
+        ask();
+        ask();
         while STATUS.read() & RECEIVED_ALL == 0 {}
         let byte = || DATA.read() as u8;
         *places = [byte(), byte(), byte(), byte(), byte(), byte(), byte(), byte()];

@@ -151,7 +151,8 @@ const fn micros(ticks: u64) -> u64 {
     let (high, low) = ((ticks >> 32) as u32, ticks as u32);
     let carried = high % DIVISOR;
     let rest = (carried * REMAINDER + low % DIVISOR) / DIVISOR;
-    ((high / DIVISOR) as u64) << 32 | (carried * QUOTIENT) as u64 + (low / DIVISOR + rest) as u64
+    let low_part = (carried * QUOTIENT) as u64 + (low / DIVISOR + rest) as u64;
+    (((high / DIVISOR) as u64) << 32) + low_part
 }
 
 const _: () = {
