@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Every check, and the tools they need. Continuous integration and people run this very script.
 #
-#   ./ci.sh            all steps, in this order: install format lint test docs image fuzz deny
+#   ./ci.sh            all steps, in this order: install format lint test board docs image fuzz deny
 #   ./ci.sh STEP...    only these
 #
 # Not more than half an hour on two cores from nothing; a few minutes when built before.
@@ -31,6 +31,16 @@ step_install() {
   if ! command -v qemu-system-arm >/dev/null && ! install_qemu; then
     echo "qemu-system-arm could not be installed: do it by hand. Until then the tests on the emulated board are skipped."
   fi
+  if ! command -v cmake >/dev/null && ! install_cmake; then
+    echo "cmake could not be installed: do it by hand. Until then the tests on the emulated STM32F746G-DISCO are skipped."
+  fi
+}
+
+# What the emulated STM32F746G-DISCO is built with.
+install_cmake() {
+  command -v apt-get >/dev/null || return 1
+  as_root apt-get update -q &&
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -yq --no-install-recommends cmake
 }
 
 install_qemu() {
@@ -47,12 +57,25 @@ step_lint() {
   cargo clippy --workspace --all-targets -- -D warnings
   # What only the device compiles; and with defmt, which no program here links yet.
   cargo clippy -p evtach-core -p evtach-firmware --target "$target" -- -D warnings
+  cargo clippy -p evtach-firmware --features stm32f746g-disco --target "$target" -- -D warnings
   cargo clippy -p evtach-core -p evtach-firmware --lib --features evtach-core/defmt,evtach-firmware/defmt \
     --target "$target" -- -D warnings
 }
 
 step_test() {
   cargo test --workspace
+}
+
+# The emulated STM32F746G-DISCO itself, which is a workspace of its own; `test` runs the device's image on it.
+step_board() {
+  cargo fmt --manifest-path tests/board/Cargo.toml --check
+  if ! command -v cmake >/dev/null; then
+    echo "skipped: no cmake"
+    return
+  fi
+  local board=(--release --manifest-path tests/board/Cargo.toml --target-dir target/board)
+  cargo clippy "${board[@]}" --all-targets -- -D warnings
+  cargo test "${board[@]}"
 }
 
 step_docs() {
@@ -62,6 +85,7 @@ step_docs() {
 # The limits on the core's state and store are assertions in the firmware: past them it does not build.
 step_image() {
   cargo build --release -p evtach-core --target "$target"
+  cargo fw-qemu
   cargo fw
 }
 
@@ -91,6 +115,8 @@ step_deny() {
     cargo install cargo-deny --locked --quiet
   fi
   cargo deny check bans licenses sources
+  # The emulated board has its own rules: its processor is GPL-2.0.
+  cargo deny --manifest-path tests/board/Cargo.toml check --config tests/board/deny.toml bans licenses sources
   # The database of advisories lies on GitHub, out of reach of some machines. That it cannot be
   # fetched is no finding; what it says is.
   if cargo deny fetch db 2>/dev/null; then
@@ -101,10 +127,10 @@ step_deny() {
 }
 
 steps=("$@")
-[ ${#steps[@]} -gt 0 ] || steps=(install format lint test docs image fuzz deny)
+[ ${#steps[@]} -gt 0 ] || steps=(install format lint test board docs image fuzz deny)
 for step in "${steps[@]}"; do
   if ! declare -F "step_$step" >/dev/null; then
-    echo "ci.sh: no step \"$step\": choose from install format lint test docs image fuzz deny"
+    echo "ci.sh: no step \"$step\": choose from install format lint test board docs image fuzz deny"
     exit 2
   fi
 done

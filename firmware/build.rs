@@ -15,6 +15,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!("cargo:rustc-link-arg-bins=-Tlink.x");
         // Flash does not begin at a page boundary.
         println!("cargo:rustc-link-arg-bins=--nmagic");
+        // A file of its own would be passed over: the linker looks for memory.x where it is started, and cargo starts it
+        // at the root of the repository.
+        println!("cargo:rustc-link-arg-bin=mps2_an500=--defsym=_mps2_an500=1");
+        if env::var_os("CARGO_FEATURE_STM32F746G_DISCO").is_some() {
+            println!("cargo:rustc-link-arg-bin=stm32f746g_disco=-Tdefmt.x");
+        }
     }
     Ok(())
 }

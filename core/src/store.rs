@@ -3,7 +3,7 @@
 //! Time is cut into segments of equal length; [`WINDOW_SEGMENTS`] of them are the window, and
 //! [`SPARE_SEGMENTS`] more take in events while the window is measured. A segment first keeps a dense
 //! burst of consecutive events (what a registration of neighbouring slices needs), then, octave by octave, every
-//! second, fourth and eighth event, so that the baseline grows geometrically from the burst on; what is left of
+//! second, fourth, eighth and sixteenth event, so that the baseline grows geometrically from the burst on; what is left of
 //! its memory is a reservoir thinned evenly (what a long baseline needs): every 2^s-th event, s growing as
 //! the reservoir fills. What is kept depends on the events and the capacity alone, never on when a task ran.
 
@@ -28,7 +28,7 @@ pub const SEGMENTS: usize = WINDOW_SEGMENTS + SPARE_SEGMENTS;
 #[derive(Debug)]
 pub struct Store<'m> {
     events: &'m mut [StoredEvent],
-    /// Events in one segment: 4/16 dense, 3/16 in octaves, 9/16 reservoir.
+    /// Events in one segment: 3/16 dense, 4/16 in octaves, 9/16 reservoir.
     capacity: usize,
     segments: [Segment; SEGMENTS],
     /// Ring position of the oldest segment.

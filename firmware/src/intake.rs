@@ -5,7 +5,8 @@ use core::mem;
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_sync::zerocopy_channel::Sender;
 use embassy_time::{Duration, Instant, Timer};
-use evtach_core::{Geometry, PackedEvent};
+use evtach_core::{Geometry, GyroSample, PackedEvent};
+use heapless::Vec;
 
 use crate::record::{Decoder, Header, HeaderError, RECORD_BYTES};
 
@@ -16,11 +17,16 @@ pub const BLOCK_EVENTS: usize = 128;
 /// of the measurement may take: 0.9 million instructions at 216 MHz.
 pub const BLOCKS: usize = 32;
 
+/// Gyro samples in one block. Sensors take about a thousand a second, and a block is sent when it holds so many.
+pub const BLOCK_GYRO: usize = 2;
+
 /// Events on their way from intake to measurement.
 #[derive(Clone, Debug)]
 pub struct Block {
     places: [PackedEvent; BLOCK_EVENTS],
     filled: usize,
+    /// Samples of the sensor's gyro that came between these.
+    pub gyro: Vec<GyroSample, BLOCK_GYRO>,
     /// Time of the first event in microseconds: packed ones tell only its low 32 bits.
     pub t_us: u64,
     /// Size of the sensor that they come from.
@@ -36,6 +42,7 @@ impl Block {
     pub const EMPTY: Self = Self {
         places: [PackedEvent::ZERO; BLOCK_EVENTS],
         filled: 0,
+        gyro: Vec::new(),
         t_us: 0,
         // All zeros, so that the blocks need no image in flash.
         geometry: Geometry { width_px: 0, height_px: 0 },
@@ -49,9 +56,16 @@ impl Block {
         self.places.get(..self.filled).unwrap_or_default()
     }
 
-    /// Forgets the events.
-    pub const fn clear(&mut self) {
+    /// Forgets the events, and what the gyro said.
+    pub fn clear(&mut self) {
         self.filled = 0;
+        self.gyro.clear();
+    }
+
+    /// Whether there is nothing in it.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.filled == 0 && self.gyro.is_empty()
     }
 
     /// Where further events go: see [`Block::filled`].

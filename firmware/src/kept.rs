@@ -55,13 +55,13 @@ const fn code(fault: Fault) -> u8 {
         Fault::Exception => 2,
         Fault::Watchdog => 3,
         Fault::Preferences => 4,
+        Fault::Crystal => 5,
+        Fault::Memory => 6,
     }
 }
 
 fn fault(code: u8) -> Option<Fault> {
-    [Fault::Panic, Fault::Exception, Fault::Watchdog, Fault::Preferences]
-        .into_iter()
-        .find(|&fault| self::code(fault) == code)
+    Fault::ALL.into_iter().find(|&fault| self::code(fault) == code)
 }
 
 /// The block of a fault: magic, kind, length of the text, text, checksum of all before.
@@ -122,7 +122,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_message_comes_back_as_far_as_there_is_room(text in ".{0,200}", which in 1_u8..5) {
+        fn any_message_comes_back_as_far_as_there_is_room(text in ".{0,200}", which in 1_u8..7) {
             let kept = KeptFault::new(fault(which).expect("a fault"), &text);
             prop_assert!(text.starts_with(kept.text.as_str()));
             prop_assert!(kept.text.as_str() == text || kept.text.len() > TEXT_BYTES - 4);

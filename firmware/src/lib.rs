@@ -5,7 +5,7 @@
 //! peripherals and interrupts, and nothing else.
 #![no_std]
 
-#[cfg(test)]
+#[cfg(any(test, feature = "emulated-camera"))]
 extern crate std;
 
 pub mod cost;
@@ -20,4 +20,6 @@ pub mod scpi;
 pub mod sensor;
 pub mod settings;
 pub mod tasks;
+#[cfg(test)]
+mod test_time;
 pub mod ui;

@@ -29,6 +29,9 @@ impl<C: Clock> Intake<'_, '_, C> {
             self.tachometer.lost(block.lost);
         }
         self.costs.push(self.tachometer, block.t_us, block.events());
+        for sample in &block.gyro {
+            self.tachometer.gyro(*sample);
+        }
         self.ended |= block.last;
     }
 }

@@ -6,6 +6,7 @@ use evtach_firmware::recorder::Recorder;
 use evtach_firmware::scpi::{
     Device, Identity, Link, RecorderFailed, RecorderStatus, Statistics, View,
 };
+use evtach_firmware::sensor::usb::Trouble;
 
 /// Memory for recordings that fails when told to.
 pub struct Ram {
@@ -36,6 +37,7 @@ impl embedded_storage::Storage for Ram {
 /// The device.
 pub struct Bench {
     pub sensor: Sensor,
+    pub trouble: Option<Trouble>,
     pub geometry: Option<Geometry>,
     pub reading: Option<Reading>,
     pub reason: Reason,
@@ -59,6 +61,7 @@ impl Bench {
         let ram = Ram { bytes: vec![0; memory_bytes], broken: false };
         Self {
             sensor: Sensor::Present,
+            trouble: None,
             geometry: Geometry::new(320, 240),
             reading: None,
             reason: Reason::Searching,
@@ -98,6 +101,10 @@ impl Device for Bench {
 
     fn sensor(&self) -> Sensor {
         self.sensor
+    }
+
+    fn trouble(&self) -> Option<Trouble> {
+        self.trouble
     }
 
     fn reading(&self) -> Option<&Reading> {

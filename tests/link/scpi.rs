@@ -10,6 +10,7 @@ use evtach_core::{
 use evtach_firmware::instrument::{Fault, Sensor, Unit};
 use evtach_firmware::record::{Decoder, Header};
 use evtach_firmware::scpi::{ErrorCode, LINE_BYTES, Link, LogLine, READING_TIMEOUT_US, Statistics};
+use evtach_firmware::sensor::usb::Trouble;
 use proptest::prelude::*;
 
 fn rotor(id: u8, rpm: f32) -> RotorReading {
@@ -361,6 +362,17 @@ fn faults_and_lost_preferences_are_told() {
     assert_eq!(session.ask("SYST:FAUL:CLE;:SYST:FAUL?"), "\"none\",\"\"\n");
     session.bench.fault = Some((Fault::Preferences, String::new()));
     assert_eq!(session.error(), -314);
+}
+
+#[test]
+fn why_there_is_no_sensor_is_told() {
+    let mut session = Session::new();
+    assert_eq!(session.ask("SYST:SENS?"), "\"present\",\"\"\n");
+    session.bench.sensor = Sensor::Absent;
+    assert_eq!(session.ask("SYST:SENS?"), "\"absent\",\"\"\n");
+    session.bench.trouble = Some(Trouble::Foreign { vendor_id: 0x046d, product_id: 0xc52b });
+    let words = "046d:c52b is no camera known here: plug in another";
+    assert_eq!(session.ask("SYST:SENS?"), format!("\"refused\",\"{words}\"\n"));
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! iniVation DAVIS (DAVIS346 and kin): 16-bit USB words.
 
-use super::inivation::Clock;
-use super::polarity;
-use crate::event::{Event, GyroSample};
+use super::inivation::{CLOCK_RESET, Clock};
+use super::{Packed, polarity};
+use crate::event::{Event, GyroSample, PackedEvent};
 
 /// Bytes of an inertial sample: acceleration, temperature, rate, each big-endian.
 const IMU_BYTES: u8 = 14;
@@ -77,6 +77,64 @@ impl Davis {
             _ => self.unknown += 1,
         }
         None
+    }
+
+    /// Decodes words into `events`, until either is used up, or a gyro sample is complete, or
+    /// the clock is set to zero. Times are `offset_us` later than
+    /// the camera's, and never earlier than `reached_us`, which they move on.
+    pub fn pack(
+        &mut self,
+        words: &[[u8; 2]],
+        offset_us: u64,
+        reached_us: &mut u64,
+        events: &mut [PackedEvent],
+    ) -> Packed {
+        let room = events.len();
+        let mut places = events.iter_mut();
+        let mut t_us = *reached_us;
+        for (index, word) in words.iter().enumerate() {
+            let word = u16::from_le_bytes(*word);
+            let data = word & 0x0fff;
+            match word >> 12 {
+                8.. => {
+                    self.clock.low(word);
+                    t_us = t_us.max(offset_us.wrapping_add(self.clock.t_us()));
+                }
+                1 => self.row = data,
+                code @ (2 | 3) => {
+                    let Some(place) = places.next() else {
+                        *reached_us = t_us;
+                        return Packed { words: index, events: room, sample: None, reset: false };
+                    };
+                    let (x, y) =
+                        if self.mounting.swap_xy { (self.row, data) } else { (data, self.row) };
+                    *place = PackedEvent::new(t_us as u32, x, y, polarity(code == 3));
+                }
+                _ if word == CLOCK_RESET => {
+                    let reset = index == 0;
+                    if reset {
+                        self.clock.reset();
+                    }
+                    *reached_us = t_us;
+                    let events = room - places.len();
+                    return Packed { words: index.max(1), events, sample: None, reset };
+                }
+                _ => {
+                    let sample = self.decode(word, |_| {});
+                    t_us = t_us.max(offset_us.wrapping_add(self.clock.t_us()));
+                    if let Some(sample) = sample {
+                        *reached_us = t_us;
+                        let words = index + 1;
+                        let t_us = offset_us.wrapping_add(sample.t_us);
+                        let sample = Some(GyroSample { t_us, ..sample });
+                        let events = room - places.len();
+                        return Packed { words, events, sample, reset: false };
+                    }
+                }
+            }
+        }
+        *reached_us = t_us;
+        Packed { words: words.len(), events: room - places.len(), sample: None, reset: false }
     }
 
     fn special(&mut self, data: u16) -> Option<GyroSample> {

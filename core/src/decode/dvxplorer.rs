@@ -1,8 +1,8 @@
 //! iniVation DVXplorer (640x480): 16-bit USB words with groups of eight pixels.
 
-use super::inivation::Clock;
-use super::polarity;
-use crate::event::Event;
+use super::inivation::{CLOCK_RESET, Clock};
+use super::{Packed, polarity};
+use crate::event::{Event, PackedEvent};
 
 /// Pixels in a group, one above the other.
 const GROUP_PX: u16 = 8;
@@ -59,6 +59,47 @@ impl Dvxplorer {
             0 | 5 | 6 => {}
             _ => self.unknown += 1,
         }
+    }
+
+    /// Decodes words into `events`, until the words are used up, fewer than eight places are left, or the clock is set to zero.
+    /// Times are `offset_us` later than the camera's, and never earlier than `reached_us`, which they move on. With `swap_xy`, columns are
+    /// sent as rows.
+    pub fn pack(
+        &mut self,
+        words: &[[u8; 2]],
+        swap_xy: bool,
+        offset_us: u64,
+        reached_us: &mut u64,
+        events: &mut [PackedEvent],
+    ) -> Packed {
+        let room = events.len();
+        let mut places = events.iter_mut();
+        let (mut used, mut reset) = (words.len(), false);
+        let mut t_us = *reached_us;
+        for (index, word) in words.iter().enumerate() {
+            if places.len() < usize::from(GROUP_PX) {
+                used = index;
+                break;
+            }
+            let word = u16::from_le_bytes(*word);
+            if word == CLOCK_RESET {
+                reset = index == 0;
+                if reset {
+                    self.clock.reset();
+                }
+                used = index.max(1);
+                break;
+            }
+            self.decode(word, |event| {
+                t_us = t_us.max(offset_us.wrapping_add(event.t_us));
+                if let Some(place) = places.next() {
+                    let (x, y) = if swap_xy { (event.y, event.x) } else { (event.x, event.y) };
+                    *place = PackedEvent::new(t_us as u32, x, y, event.polarity);
+                }
+            });
+        }
+        *reached_us = t_us;
+        Packed { words: used, events: room - places.len(), sample: None, reset }
     }
 
     /// A first group and a second one some groups above or below it.

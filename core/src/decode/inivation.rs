@@ -1,5 +1,8 @@
 //! What the USB words of iniVation's cameras have in common: 16 bits, and a 15-bit clock with wrap words.
 
+/// The word by which a camera tells that its clock was set to zero.
+pub(super) const CLOCK_RESET: u16 = 1;
+
 /// Clock behind words with bit 15 set (low 15 bits of the time) and wrap words (multiples of 2^15 us).
 #[derive(Clone, Debug, Default)]
 pub(super) struct Clock {

@@ -17,7 +17,21 @@ pub use evt2::Evt2;
 pub use evt3::Evt3;
 pub use evt21::Evt21;
 
-use crate::event::Polarity;
+use crate::event::{GyroSample, Polarity};
+
+/// How far a camera's words were decoded at once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Packed {
+    /// Words used up.
+    pub words: usize,
+    /// Events that came of them.
+    pub events: usize,
+    /// A gyro sample that the last of them completed.
+    pub sample: Option<GyroSample>,
+    /// Whether the last of them, then the only one, set the camera's clock to zero.
+    pub reset: bool,
+}
 
 /// The polarity a wire bit stands for: set means brighter in every format read here.
 #[inline]

@@ -24,12 +24,17 @@ use crate::limits::MAX_KNOTS;
 use crate::math::{TAU, Turn, TurnRate, quick_sqrt, sqrt};
 use crate::rotors::Disc;
 use crate::store::Window;
-use blocks::{BLOCK_SHARE, Block, LEAST_SHARE, WALK_PX, WALK_SINGLE_PX, WALK_US, Walk, correct};
+use blocks::{
+    BLOCK_SHARE, Block, LEAST_SHARE, MOST_FINE_WALK, MOST_WALK, WALK_PX, WALK_SINGLE_PX, WALK_US,
+    Walk, correct,
+};
 use schedule::{Phase, Schedule};
 use template::{BANKS, Counts, RINGS, Template};
 
 /// Events that a block should hold.
 const BLOCK_EVENTS: usize = 32;
+/// Fewest blocks: a trend needs them.
+const LEAST_BLOCKS: usize = 12;
 /// Shortest block: a hand trembles up to 12 Hz, a host shakes up to some 60 Hz.
 const SHORTEST_BLOCK_US: f32 = 3_000.0;
 /// Most blocks in a symmetry period.
@@ -40,8 +45,6 @@ const FOLDED_PERIODS: usize = 3;
 const MOST_HARMONIC: u32 = 96;
 /// A doubled harmonic must keep this share of the events in step that were so at first.
 const SHARP_COHERENCE: f32 = 0.5;
-/// Share of the events in step that edges as sharp as can be seen leave there.
-const SEEN_COHERENCE: f32 = 0.75;
 /// Blocks over which the wandering of the axis is judged.
 const DRIFT_BLOCKS: usize = 12;
 
@@ -192,17 +195,6 @@ impl Pose {
         }
     }
 
-    /// Blur in pixels half-way to the rim below which edges could not be seen, where parts differ and the harmonic rose as
-    /// far as it may; 0 where it may rise further.
-    #[must_use]
-    pub fn least_blur_px(&self) -> f32 {
-        if self.has_overtone() && self.harmonic == self.most_harmonic {
-            0.5 * self.disc.radius_px / (SEEN_COHERENCE * self.harmonic as f32)
-        } else {
-            0.0
-        }
-    }
-
     /// Whether twice the harmonic that the rotor was found by keeps step too.
     #[must_use]
     pub const fn has_overtone(&self) -> bool {
@@ -279,8 +271,11 @@ impl Pose {
         }
         let mut moved_px = f32::MAX;
         if self.phases.is_some() {
+            // Between the few knots of the first rounds a hand goes far.
+            let coarse = self.schedule.phase() < Phase::Fine;
+            let most = if coarse { MOST_WALK } else { MOST_FINE_WALK };
             let walk = Walk {
-                step_px: self.walk_px * (self.path.step_us() / WALK_US).max(1.0),
+                step_px: self.walk_px * (self.path.step_us() / WALK_US).max(1.0).min(most),
                 coherence: self.coherence,
                 harmonic: self.harmonic,
                 radius_px: self.disc.radius_px,
@@ -321,13 +316,13 @@ impl Pose {
         let events = self.events.min(self.schedule.events(self.events));
         let even = (events as f32 * self.even_share) as usize;
         let most = (even / BLOCK_EVENTS).min(self.schedule.blocks());
-        let most = most.clamp(4, MAX_KNOTS - 1) as f32;
+        let most = most.clamp(LEAST_BLOCKS, MAX_KNOTS - 1) as f32;
         let shortest = (self.window_us / most).max(SHORTEST_BLOCK_US);
         let split = libm::floorf((self.period_us / shortest).min(MOST_IN_PERIOD));
         let step_us = if split >= 1.0 {
             self.period_us / split
         } else {
-            self.period_us * libm::ceilf(shortest / self.period_us)
+            self.period_us * libm::roundf(shortest / self.period_us).max(1.0)
         };
         self.in_period = split as usize;
         let blocks = libm::ceilf(self.window_us / step_us - 0.25) as usize;

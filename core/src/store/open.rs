@@ -5,7 +5,7 @@ use super::{Store, StoredEvent};
 use crate::event::PackedEvent;
 
 /// Sixteenths of a segment that keep consecutive events.
-const DENSE_SIXTEENTHS: usize = 4;
+const DENSE_SIXTEENTHS: usize = 3;
 /// Sixteenths before the reservoir starts.
 const BURST_SIXTEENTHS: usize = 7;
 

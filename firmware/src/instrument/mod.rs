@@ -16,6 +16,8 @@ mod view;
 
 use evtach_core::{Direction, Reading, Status};
 
+use crate::sensor::usb::Trouble;
+
 pub use action::{Action, Mode, Page, Setting, Step};
 pub use number::Number;
 pub use picture::{BRIGHTEST, Picture};
@@ -41,6 +43,10 @@ pub enum Fault {
     Watchdog,
     /// The stored preferences could not be read; the defaults stand.
     Preferences,
+    /// The crystal of the device's clock does not swing: nothing is measured.
+    Crystal,
+    /// The external memory does not hold what is written to it: nothing is measured.
+    Memory,
 }
 
 /// What is known of the sensor, apart from its events.
@@ -83,6 +89,7 @@ pub struct Instrument {
     mode_before_hold: Mode,
     page: Page,
     sensor: Sensor,
+    trouble: Option<Trouble>,
     fault: Option<Fault>,
     now_us: u64,
     /// Time of the first reading.
@@ -116,6 +123,7 @@ impl Instrument {
             mode_before_hold: Mode::Live,
             page: Page::Main,
             sensor: Sensor::Absent,
+            trouble: None,
             fault: None,
             now_us: 0,
             first_us: None,
@@ -207,6 +215,17 @@ impl Instrument {
     /// Takes in whether a sensor answers.
     pub fn set_sensor(&mut self, sensor: Sensor) {
         self.sensor = sensor;
+    }
+
+    /// Takes in why none does, where something is plugged in.
+    pub fn set_trouble(&mut self, trouble: Option<Trouble>) {
+        self.trouble = trouble;
+    }
+
+    /// Why no sensor answers, where something is plugged in.
+    #[must_use]
+    pub const fn trouble(&self) -> Option<Trouble> {
+        self.trouble
     }
 
     /// Takes in the time and how many events have come so far.

@@ -39,6 +39,7 @@ impl Instrument {
             page: if failed { Page::Main } else { self.page },
             mode: self.mode,
             state,
+            trouble: self.trouble.filter(|_| state == State::Refused(Reason::NoSensor)),
             time_tenths: time_us.map(|(latest, first_us)| (latest.t_us - first_us) / 100_000),
             rotor: self.selected,
             speed,

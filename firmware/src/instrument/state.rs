@@ -82,7 +82,14 @@ impl From<Status> for State {
 
 impl Fault {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Panic, Self::Exception, Self::Watchdog, Self::Preferences];
+    pub const ALL: [Self; 6] = [
+        Self::Panic,
+        Self::Exception,
+        Self::Watchdog,
+        Self::Preferences,
+        Self::Crystal,
+        Self::Memory,
+    ];
 
     /// What happened, and what the person can do about it.
     #[must_use]
@@ -92,6 +99,8 @@ impl Fault {
             Self::Exception => "the processor stopped the program; restarted: press OK",
             Self::Watchdog => "a task hung and the device has restarted: press OK",
             Self::Preferences => "the settings were damaged, the defaults stand: press OK",
+            Self::Crystal => "the clock's crystal does not swing: have the board repaired",
+            Self::Memory => "the external memory fails: have the board repaired",
         }
     }
 }

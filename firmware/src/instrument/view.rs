@@ -4,6 +4,8 @@ use evtach_core::limits::MAX_ROTORS;
 use evtach_core::{Direction, Status};
 use heapless::Vec;
 
+use crate::sensor::usb::Trouble;
+
 use super::{Beyond, Mode, Number, Page, Preferences, Rate, State};
 
 /// A value in the chosen unit with one standard deviation of its error.
@@ -66,6 +68,8 @@ pub struct View {
     pub mode: Mode,
     /// In which state the measurement stands.
     pub state: State,
+    /// Why there is no sensor, where something is plugged in.
+    pub trouble: Option<Trouble>,
     /// Sensor time since the first reading, in tenths of a second: of the reading while it is held.
     pub time_tenths: Option<u64>,
     /// Rotor that the big number shows.

@@ -2,7 +2,6 @@ extern crate std;
 
 use std::vec::Vec as Heap;
 
-use embassy_futures::block_on;
 use embassy_futures::join::join;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::zerocopy_channel::{Channel, Receiver};
@@ -10,6 +9,7 @@ use evtach_core::{Event, Geometry, Polarity};
 
 use super::*;
 use crate::record;
+use crate::test_time::block_on;
 
 /// Bytes in memory.
 struct Bytes<'b>(&'b [u8]);

@@ -141,6 +141,7 @@ pub enum System {
     LogQuery,
     Fault,
     FaultClear,
+    Sensor,
     Preset,
     Headers,
 }
@@ -261,6 +262,7 @@ pub const COMMANDS: &[(&str, Command)] = table![
     ("SYSTem:LOG?", Command::System(System::LogQuery)),
     ("SYSTem:FAULt?", Command::System(System::Fault)),
     ("SYSTem:FAULt:CLEar", Command::System(System::FaultClear)),
+    ("SYSTem:SENSor?", Command::System(System::Sensor)),
     ("SYSTem:PRESet", Command::System(System::Preset)),
     ("SYSTem:HELP:HEADers?", Command::System(System::Headers)),
     ("HCOPy:SDUMp:DATA?", Command::Hardcopy),

@@ -5,6 +5,7 @@ use evtach_core::{Geometry, Reading, Reason, Roi};
 
 use crate::instrument::{Fault, Preferences, Sensor};
 use crate::recorder::Recorder;
+use crate::sensor::usb::Trouble;
 
 /// What `*IDN?` answers, and nothing that a comma could split.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,6 +88,11 @@ pub trait Device {
 
     /// Whether a sensor answers.
     fn sensor(&self) -> Sensor;
+
+    /// Why none does, where something is plugged in.
+    fn trouble(&self) -> Option<Trouble> {
+        None
+    }
 
     /// The reading that the screen shows, held or live, its speeds corrected by the clock's trim; `None` while it
     /// shows none.

@@ -91,7 +91,11 @@ impl Session {
         if let Some(fault) = fault.filter(|_| !self.fault_told) {
             let code = match fault {
                 Fault::Preferences => ErrorCode::MemoryLost,
-                Fault::Panic | Fault::Exception | Fault::Watchdog => ErrorCode::System,
+                Fault::Panic
+                | Fault::Exception
+                | Fault::Watchdog
+                | Fault::Crystal
+                | Fault::Memory => ErrorCode::System,
             };
             self.report(ScpiError { code, byte: None });
         }

@@ -1,5 +1,9 @@
 //! IEEE 488.2's commands, `SYSTem` and `STATus`.
 
+use core::fmt::Write as _;
+
+use heapless::String;
+
 use super::commands::{Access, Common, Group, HEADERS_BYTES, System};
 use super::device::{Device, View};
 use super::error::ScpiError;
@@ -9,6 +13,7 @@ use super::session::{Block, BlockKind, Flow, Session};
 use super::setting;
 use super::status::{Register, esr, stb};
 use crate::instrument::{Fault, Preferences, Sensor};
+use crate::sensor::usb::TROUBLE_BYTES;
 
 impl Session {
     pub(super) fn common(
@@ -84,6 +89,22 @@ impl Session {
             System::Version => out.plain("1999.0"),
             System::Log => self.log = log,
             System::LogQuery => out.plain(u8::from(log)),
+            System::Sensor => match (device.sensor(), device.trouble()) {
+                (Sensor::Present, _) => {
+                    out.text("present");
+                    out.text("");
+                }
+                (Sensor::Absent, None) => {
+                    out.text("absent");
+                    out.text("");
+                }
+                (Sensor::Absent, Some(trouble)) => {
+                    let mut words = String::<TROUBLE_BYTES>::new();
+                    write!(words, "{trouble}").ok();
+                    out.text("refused");
+                    out.text(&words);
+                }
+            },
             System::Fault => match device.fault() {
                 Some((fault, words)) => {
                     out.text(match fault {
@@ -91,6 +112,8 @@ impl Session {
                         Fault::Exception => "exception",
                         Fault::Watchdog => "watchdog",
                         Fault::Preferences => "preferences",
+                        Fault::Crystal => "crystal",
+                        Fault::Memory => "memory",
                     });
                     out.text(words);
                 }

@@ -5,6 +5,7 @@ use evtach_core::{Geometry, Reading, Reason};
 use super::front::{Front, Panel, Recording};
 use crate::instrument::{Action, Fault, Mode, Preferences, Sensor, State};
 use crate::scpi::{Device, Identity, RecorderFailed, RecorderStatus, Statistics, View};
+use crate::sensor::usb::Trouble;
 
 impl<R: Recording, P: Panel> Device for Front<R, P> {
     fn identity(&self) -> Identity<'_> {
@@ -12,7 +13,11 @@ impl<R: Recording, P: Panel> Device for Front<R, P> {
     }
 
     fn sensor(&self) -> Sensor {
-        if self.shared.acquired().sensor.is_some() { Sensor::Present } else { Sensor::Absent }
+        if self.shared.standing().geometry.is_some() { Sensor::Present } else { Sensor::Absent }
+    }
+
+    fn trouble(&self) -> Option<Trouble> {
+        self.instrument.trouble()
     }
 
     fn reading(&self) -> Option<&Reading> {
@@ -81,7 +86,7 @@ impl<R: Recording, P: Panel> Device for Front<R, P> {
     }
 
     fn geometry(&self) -> Option<Geometry> {
-        self.shared.acquired().sensor.map(|hello| hello.geometry)
+        self.shared.standing().geometry
     }
 
     fn view(&self) -> View {

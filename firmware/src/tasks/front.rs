@@ -10,6 +10,7 @@ use super::shared::{Shared, Wanted};
 use crate::instrument::{Action, Fault, Instrument, Preferences, Sensor, Traffic};
 use crate::kept::{KeptFault, TEXT_BYTES};
 use crate::scpi::{RecorderFailed, RecorderStatus, View};
+use crate::ui::Screen;
 
 /// What the recorder's memory belongs to: the board says how it is shared with the task that fills it.
 pub trait Recording {
@@ -34,6 +35,9 @@ pub trait Recording {
 pub trait Panel: DrawTarget<Color = Rgb565> {
     /// The pixels, row by row, two bytes each, little-endian.
     fn bytes(&self) -> &[u8];
+
+    /// A drawing is complete: a panel that is drawn on unseen shows it now.
+    fn present(&mut self) {}
 }
 
 /// The front of the device: what a person sees and asks, on the screen and over the link.
@@ -88,6 +92,7 @@ impl<R: Recording, P: Panel> Front<R, P> {
     /// Does what a person asks by touch or button.
     pub fn act(&mut self, action: Action) {
         self.instrument.act(action);
+        self.shared.touched.signal(());
     }
 
     /// Shows a fault.
@@ -96,20 +101,27 @@ impl<R: Recording, P: Panel> Front<R, P> {
         self.words = Some(kept.text);
     }
 
+    /// Draws what has changed.
+    pub fn draw(&mut self, screen: &mut Screen) {
+        // A panel that fails is drawn whole the next time.
+        screen.draw(&mut self.panel, &self.instrument).ok();
+        self.panel.present();
+    }
+
     /// Takes in what has come from the other tasks.
     pub fn refresh(&mut self) {
-        let acquired = self.shared.acquired();
-        let sensor = if acquired.sensor.is_some() { Sensor::Present } else { Sensor::Absent };
+        let standing = self.shared.standing();
+        let sensor = if standing.geometry.is_some() { Sensor::Present } else { Sensor::Absent };
         self.instrument.set_sensor(sensor);
+        self.instrument.set_trouble(standing.trouble);
         let now = Instant::now();
-        if acquired.latest_us != self.reached.0 {
-            self.reached = (acquired.latest_us, now);
+        if standing.latest_us != self.reached.0 {
+            self.reached = (standing.latest_us, now);
         }
         let since = now.saturating_duration_since(self.reached.1);
-        let lost = acquired.account.lost.total().saturating_add(acquired.overrun);
         self.instrument.tick(
             self.reached.0.saturating_add(since.as_micros()),
-            Traffic { events: acquired.account.received.saturating_sub(acquired.overrun), lost },
+            Traffic { events: standing.received, lost: standing.lost },
         );
         while let Ok(reading) = self.shared.readings.try_receive() {
             self.instrument.observe(&reading);

@@ -27,7 +27,7 @@ const SAVE: Duration = Duration::from_millis(500);
 /// Longest time that a task may be silent. Measuring says that it is alive after every step, the others twice a second.
 const HUNG: Duration = Duration::from_secs(3);
 
-/// Draws four times a second what the instrument shows, and feeds the watchdog while every task is alive; with one that is
+/// Draws four times a second, and when a person asks for something, what the instrument shows, and feeds the watchdog while every task is alive; with one that is
 /// not, `hung` is told which.
 pub async fn show<R: Recording, P: Panel>(
     front: &RefCell<Front<R, P>>,
@@ -42,8 +42,7 @@ pub async fn show<R: Recording, P: Panel>(
         {
             let front = &mut *front.borrow_mut();
             front.refresh();
-            // A panel that fails is drawn whole the next time.
-            screen.draw(&mut front.panel, &front.instrument).ok();
+            front.draw(&mut screen);
         }
         if shared.all_alive() {
             last_alive = Instant::now();
@@ -53,7 +52,7 @@ pub async fn show<R: Recording, P: Panel>(
             hung(task);
         }
         feed();
-        ticker.next().await;
+        select(ticker.next(), shared.touched.wait()).await;
     }
 }
 

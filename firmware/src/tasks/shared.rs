@@ -9,7 +9,7 @@ use embassy_sync::channel::Channel;
 use evtach_core::{Reading, Roi};
 
 use crate::instrument::Picture;
-use crate::sensor::spi::Acquired;
+use crate::sensor::Standing;
 
 /// Readings on their way to the instrument: at 20 a second, a tenth of a second.
 const READINGS: usize = 2;
@@ -54,7 +54,7 @@ pub struct Wanted {
 
 /// Everything between the tasks but the blocks of events.
 pub struct Shared {
-    acquired: Mutex<CriticalSectionRawMutex, Cell<Acquired>>,
+    standing: Mutex<CriticalSectionRawMutex, Cell<Standing>>,
     pub(super) readings: Channel<CriticalSectionRawMutex, Reading, READINGS>,
     pub(super) dropped: AtomicU32,
     /// The last that was asked for. No `Signal`: that is not all zeros at the start, and would have the flash hold a copy of all this.
@@ -62,6 +62,8 @@ pub struct Shared {
     /// A picture to be taken, and one that has been.
     pub(super) blank: Channel<CriticalSectionRawMutex, &'static mut Picture, 1>,
     pub(super) taken: Channel<CriticalSectionRawMutex, &'static mut Picture, 1>,
+    /// A person has asked for something, and wants to see it.
+    pub(super) touched: Signal<CriticalSectionRawMutex, ()>,
     alive: AtomicU32,
 }
 
@@ -76,12 +78,13 @@ impl Shared {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            acquired: Mutex::new(Cell::new(Acquired::NONE)),
+            standing: Mutex::new(Cell::new(Standing::NONE)),
             readings: Channel::new(),
             dropped: AtomicU32::new(0),
             wanted: Channel::new(),
             blank: Channel::new(),
             taken: Channel::new(),
+            touched: Signal::new(),
             alive: AtomicU32::new(0),
         }
     }
@@ -103,15 +106,15 @@ impl Shared {
     }
 
     /// How acquisition stands: told by the acquiring task, which is alive then.
-    pub fn tell_acquired(&self, acquired: &Acquired) {
-        self.acquired.lock(|cell| cell.set(*acquired));
+    pub fn tell(&self, standing: Standing) {
+        self.standing.lock(|cell| cell.set(standing));
         self.alive(Task::Acquire);
     }
 
     /// How acquisition stands.
     #[must_use]
-    pub fn acquired(&self) -> Acquired {
-        self.acquired.lock(Cell::get)
+    pub fn standing(&self) -> Standing {
+        self.standing.lock(Cell::get)
     }
 
     /// A task says that it is alive.

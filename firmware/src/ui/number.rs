@@ -10,6 +10,7 @@ use heapless::String;
 use super::text::{self, Align, Font, HUGE, Ink, MEDIUM, SMALL, width};
 use super::theme::{self, BACK, BAD, DIM, FAINT, TEXT, area};
 use crate::instrument::{Mode, Number, State, View};
+use crate::sensor::usb::TROUBLE_BYTES;
 
 /// Where the number ends.
 const RIGHT: i32 = 396;
@@ -76,7 +77,8 @@ pub fn write<D: DrawTarget<Color = Rgb565>>(
 
 pub fn details_changed(a: &View, b: &View) -> bool {
     let of = |v: &View| {
-        (v.speed, v.state, v.direction, v.blades, v.preferences.blades, v.preferences.unit)
+        let found = (v.speed, v.state, v.trouble, v.direction, v.blades);
+        (found, v.preferences.blades, v.preferences.unit)
     };
     of(a) != of(b)
 }
@@ -91,7 +93,12 @@ pub fn draw_details<D: DrawTarget<Color = Rgb565>>(
     let advice = view.state.advice();
     if !advice.is_empty() {
         let ink = Ink { colour: TEXT, paper: BACK };
-        text::draw(target, &SMALL, advice, left, Align::Left, ink)?;
+        let mut words = String::<TROUBLE_BYTES>::new();
+        match view.trouble {
+            Some(trouble) => write!(words, "{trouble}").ok(),
+            None => words.push_str(advice).ok(),
+        };
+        text::draw(target, &SMALL, &words, left, Align::Left, ink)?;
     } else if let Some(direction) = view.direction {
         draw_turning(target, left, direction, view)?;
     }

@@ -1,3 +1,5 @@
+use std::string::ToString as _;
+
 use embedded_graphics::prelude::*;
 use evtach_core::Reason;
 
@@ -7,6 +9,7 @@ use crate::instrument::{
     Action, Fault, Instrument, MAX_BLADES, Page, Preferences, Sensor, Setting, State, Step, Unit,
     View,
 };
+use crate::sensor::usb::{Model, Module, Register, TROUBLE_BYTES, Trouble};
 
 fn view(page: Page) -> View {
     let mut instrument = Instrument::new(Preferences::default());
@@ -25,6 +28,24 @@ fn every_word_fits_where_it_stands() {
     }
     for fault in Fault::ALL {
         assert!(width(&SMALL, fault.advice()) <= 464, "{}", fault.advice());
+    }
+    let register = Register { module: Module::Dvs, parameter: u16::MAX };
+    let model = Model::Dvxplorer;
+    for trouble in [
+        Trouble::Foreign { vendor_id: 0xdddd, product_id: 0xdddd },
+        Trouble::OldFirmware { model, has: 200, needs: 200 },
+        Trouble::OtherLogic { model, version: 88, patch: 88 },
+        Trouble::Slow,
+        Trouble::NoData,
+        Trouble::NoAnswer,
+        Trouble::Register(register),
+        Trouble::Nonsense(register),
+        Trouble::Stalled,
+        Trouble::Damaged,
+        Trouble::Overcurrent,
+    ] {
+        let words = trouble.to_string();
+        assert!(width(&SMALL, &words) <= 464 && words.len() <= TROUBLE_BYTES, "{words}");
     }
     // Beside the error.
     assert!(width(&SMALL, State::Held.advice()) <= 290);

@@ -4,7 +4,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{env, fs};
 
-use object::{Object as _, ObjectSection as _, ObjectSymbol as _, SectionFlags, SectionKind, elf};
+use object::read::elf::{FileHeader as _, ProgramHeader as _};
+use object::{
+    Endianness, Object as _, ObjectSection as _, ObjectSymbol as _, SectionFlags, SectionKind, elf,
+};
 
 use super::DeviceError;
 
@@ -17,8 +20,12 @@ pub struct Image {
     pub flash_bytes: u64,
     /// Bytes of variables in RAM, without the stack.
     pub ram_bytes: u64,
+    /// Bytes of RAM that the stack has.
+    pub stack_bytes: u64,
     /// Names of all functions and variables.
     pub symbols: Vec<String>,
+    /// What flash holds, from its start on; gaps are as erased.
+    pub flash: Vec<u8>,
 }
 
 /// The repository that this program was built in.
@@ -26,16 +33,30 @@ pub(super) fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// Builds the firmware for the emulated board, when it is not up to date.
+/// Builds the firmware for QEMU's board, when it is not up to date.
 ///
 /// # Errors
 ///
 /// When cargo is missing, the build fails, or the image cannot be read.
 pub fn build() -> Result<Image, DeviceError> {
+    build_by("fw-qemu")
+}
+
+/// Builds the firmware for the STM32F746G-DISCO, when it is not up to date.
+///
+/// # Errors
+///
+/// When cargo is missing, the build fails, or the image cannot be read.
+pub fn build_for_board() -> Result<Image, DeviceError> {
+    build_by("fw")
+}
+
+/// Builds the image that an alias in .cargo/config.toml stands for.
+fn build_by(alias: &'static str) -> Result<Image, DeviceError> {
     let root = root();
     let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let output = Command::new(&cargo)
-        .args(["fw", "--quiet", "--message-format=json-render-diagnostics"])
+        .args([alias, "--quiet", "--message-format=json-render-diagnostics"])
         .current_dir(&root)
         .stderr(std::process::Stdio::inherit())
         .output()
@@ -50,7 +71,7 @@ pub fn build() -> Result<Image, DeviceError> {
         .find_map(|message| message["executable"].as_str().map(PathBuf::from));
     match executable {
         Some(path) if output.status.success() => Image::read(path),
-        _ => Err(DeviceError::Build(root)),
+        _ => Err(DeviceError::Build { alias, root }),
     }
 }
 
@@ -77,7 +98,11 @@ impl Image {
             }
         }
         let symbols = file.symbols().filter_map(|s| s.name().ok().map(str::to_owned)).collect();
-        Ok(Self { path, flash_bytes, ram_bytes, symbols })
+        let address = |name| file.symbol_by_name(name).map_or(0, |symbol| symbol.address());
+        let stack_bytes = address("_stack_start").saturating_sub(address("_stack_end"));
+        let flash =
+            flash(&bytes).map_err(|source| DeviceError::Image { path: path.clone(), source })?;
+        Ok(Self { path, flash_bytes, ram_bytes, stack_bytes, symbols, flash })
     }
 
     /// Functions that do double-precision arithmetic or allocate: neither has a place on the device,
@@ -106,6 +131,26 @@ impl Image {
             })
             .collect()
     }
+}
+
+/// What the image puts into flash, from the lowest address on: what `objcopy -O binary` writes.
+fn flash(elf: &[u8]) -> Result<Vec<u8>, object::Error> {
+    let header = elf::FileHeader32::<Endianness>::parse(elf)?;
+    let endian = header.endian()?;
+    // Where a segment is loaded, which for variables is not where they are.
+    let segments = header
+        .program_headers(endian, elf)?
+        .iter()
+        .filter(|segment| segment.p_type(endian) == elf::PT_LOAD && segment.p_filesz(endian) > 0);
+    let start = segments.clone().map(|segment| segment.p_paddr(endian)).min().unwrap_or(0);
+    let mut flash = Vec::new();
+    for segment in segments {
+        let bytes = segment.data(endian, elf).unwrap_or_default();
+        let from = (segment.p_paddr(endian) - start) as usize;
+        flash.resize(flash.len().max(from + bytes.len()), 0xff);
+        flash[from..from + bytes.len()].copy_from_slice(bytes);
+    }
+    Ok(flash)
 }
 
 /// `__adddf3`, `__extendsfdf2`, `__fixdfsi` and their like: compiler-rt writes double as `df`.
@@ -137,6 +182,8 @@ mod tests {
             path: PathBuf::new(),
             flash_bytes: 0,
             ram_bytes: 0,
+            stack_bytes: 0,
+            flash: Vec::new(),
             symbols: symbols.map(str::to_owned).to_vec(),
         };
         assert_eq!(image.unwanted_symbols(), symbols[..5]);

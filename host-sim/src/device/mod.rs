@@ -7,7 +7,7 @@ mod session;
 
 use std::path::PathBuf;
 
-pub use image::{Image, build};
+pub use image::{Image, build, build_for_board};
 pub use output::{Acquired, CallCost, DeviceReading, MemoryUse, Output};
 pub use run::{Pace, qemu_present, run, run_screen, run_spi, write_recording};
 pub use session::{Plugged, Session, Used, run_instrument};
@@ -28,10 +28,15 @@ pub enum DeviceError {
         source: std::io::Error,
     },
     /// The firmware does not build.
-    #[error("the firmware does not build: run `cargo fw` in {} to see why", .0.display())]
-    Build(PathBuf),
+    #[error("the firmware does not build: run `cargo {alias}` in {} to see why", .root.display())]
+    Build {
+        /// The alias in .cargo/config.toml that builds it.
+        alias: &'static str,
+        /// Where.
+        root: PathBuf,
+    },
     /// The image is not what the linker should have written.
-    #[error("{}: {source}; run `cargo fw` to build it anew", .path.display())]
+    #[error("{}: {source}; run `cargo fw-qemu` to build it anew", .path.display())]
     Image {
         /// The image.
         path: PathBuf,

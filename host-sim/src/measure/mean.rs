@@ -142,8 +142,9 @@ fn tiles(pieces: &[Piece]) -> Vec<&Piece> {
     tiles
 }
 
+/// The difference is taken in whole microseconds: late times have no exact f64.
 fn seconds(from_us: u64, to_us: u64) -> f64 {
-    (to_us as f64 - from_us as f64) * 1e-6
+    to_us.wrapping_sub(from_us).cast_signed() as f64 * 1e-6
 }
 
 #[cfg(test)]

@@ -23,6 +23,8 @@ const FOLLOWING: Effort = Effort { pairs: 3, points: SLICE_POINTS / 2, ..LOCK };
 const PAIR_EVENTS: usize = 1_536;
 /// Step of the refinement in symmetry periods (paper: eta x half an angle of symmetry, eta = 0.8).
 pub(super) const REFINEMENT_PERIODS: f32 = 0.4;
+/// Part of a symmetry period that the fractional-baseline test stops short by.
+pub(super) const FRACTION: f32 = 0.35;
 /// Baseline of the lock as a share of the window.
 const LOCK_SHARE: f32 = 2.0 / 3.0;
 /// Relative error that the speed is thought to have before the lock: what refinement says, within these.
@@ -128,7 +130,7 @@ impl Measurement {
             }
         }
         let effort = if self.follows { Effort { pairs: 1, ..FOLLOWING } } else { FRACTIONAL };
-        self.plan(window, (longest - 0.35).max(0.65), effort);
+        self.plan(window, (longest - FRACTION).max(0.65), effort);
         self.stage = Stage::Fractional;
     }
 

@@ -13,6 +13,8 @@ use crate::store::Window;
 pub(super) const DOUBTFUL: f32 = 0.3;
 /// The same after the look about the centre, from which on nothing but edges tells them apart.
 const IN_DOUBT: f32 = 0.6;
+/// Radius in pixels below which a centre that is off by two or three pixels fits the overtone as well.
+const SMALL_PX: f32 = 20.0;
 /// Places to each side of the centre, and how far they are apart in radii.
 const PLACES: i32 = 3;
 const SPACING: f32 = 0.1;
@@ -61,9 +63,19 @@ impl Doubt {
 }
 
 impl Measurement {
-    /// Whether another harmonic keeps step almost as well wherever the centre is thought to be.
+    /// Whether another harmonic keeps step almost as well wherever the centre is thought to be, and no overtone settles it.
     pub(super) fn in_doubt(&self) -> bool {
-        self.evidence.scan_standing.is_some_and(|standing| standing > IN_DOUBT)
+        let settled = self.pose.has_overtone() && self.disc.radius_px >= SMALL_PX;
+        self.standing() > IN_DOUBT && !settled
+    }
+
+    /// Whether there is any doubt: too much where no lock tells a harmonic from its neighbour.
+    pub(super) fn doubted(&self) -> bool {
+        self.standing() > DOUBTFUL
+    }
+
+    fn standing(&self) -> f32 {
+        self.evidence.scan_standing.unwrap_or(0.0)
     }
 
     /// Looks about the centre, then begins again with what was found there.

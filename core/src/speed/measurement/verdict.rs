@@ -1,6 +1,7 @@
 //! The verdict on a rotor: what the witnesses say together, and how sure they are.
 
 use super::super::baseline::Estimate;
+use super::baselines::FRACTION;
 use super::{Measurement, Stated};
 use crate::math::{TAU, sqrt};
 use crate::reading::{Reason, Status};
@@ -18,7 +19,8 @@ const MOST_JITTER_S: f32 = 150e-6;
 /// Blur that a jitter of one pixel makes as the pose measures it, where the harmonic rises by doubling: up to half an octave
 /// past the best, where 1 / (m exp(-m^2 / 2)) is 1.9.
 const BLUR_OF_JITTER: f32 = 1.9;
-/// Farthest deviation of the fractional-baseline test, as a share of the angle of symmetry.
+/// Farthest deviation of the fractional-baseline test, as a share of the angle of symmetry; or half of what a speed by one
+/// winding more would show, where that is more: this fraction of the difference of the two angles.
 const MOST_DEVIATION: f32 = 0.03;
 /// Witnesses of the lock may differ by this much, or by eight standard errors.
 const LOCK_AGREEMENT: f32 = 2e-3;
@@ -64,7 +66,8 @@ impl Measurement {
             // Where the parts were not counted, they are at least as many as the windings of the line.
             let parts = if self.parts.is_none() { self.windings.max(1) } else { 1 };
             let deviation = self.evidence.fractional_deviation.map(|d| d * parts as f32);
-            let whole = deviation.is_some_and(|d| d < MOST_DEVIATION);
+            let half_way = 0.5 * FRACTION / (self.windings as f32 + 1.0);
+            let whole = deviation.is_some_and(|d| d < half_way.max(MOST_DEVIATION));
             let both = combine(lock, phase);
             let sharp = both.sigma_rad_s.max(held_up * both.omega_rad_s.abs())
                 < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
@@ -74,20 +77,25 @@ impl Measurement {
             } else if sharp && long {
                 self.estimate = both;
                 self.status = Status::Locked;
-            } else if long {
-                // Too rough for a lock, and no better than either.
-                let spread = self.estimate.sigma_rad_s;
-                let sigma_rad_s = sqrt(both.sigma_rad_s * both.sigma_rad_s + spread * spread);
-                self.estimate = Estimate { sigma_rad_s, ..both };
             } else if sharp {
                 // Right if the parts are as alike as they look: the window shows too few to be sure.
                 let spread = ALIKE_SIGMA * self.estimate.sigma_rad_s;
+                let sigma_rad_s = sqrt(both.sigma_rad_s * both.sigma_rad_s + spread * spread);
+                self.estimate = Estimate { sigma_rad_s, ..both };
+            } else {
+                // Too rough for a lock, and no better than either.
+                let spread = self.estimate.sigma_rad_s;
                 let sigma_rad_s = sqrt(both.sigma_rad_s * both.sigma_rad_s + spread * spread);
                 self.estimate = Estimate { sigma_rad_s, ..both };
             }
         }
         if phase.is_none() || (lock.is_none() && !self.coarse_stands(phase)) {
             self.status = Status::Refused(Reason::Ambiguous);
+        }
+        if let (None, Some(phase)) = (lock, phase) {
+            let both = combine(self.estimate, phase);
+            let sigma_rad_s = both.sigma_rad_s.max(self.estimate.sigma_rad_s);
+            self.estimate = Estimate { sigma_rad_s, ..both };
         }
         let clock = stated.clock_sigma_ppm * 1e-6 * self.estimate.omega_rad_s;
         let roll = if self.drift_px_s > STILL_PX_S {
@@ -117,11 +125,10 @@ impl Measurement {
     /// Whether the rotor has edges: what merely keeps step with one frequency has none, and a wrong harmonic about a wrong
     /// centre has no overtone.
     pub(super) fn has_edges(&self) -> bool {
-        if self.in_doubt() && !self.pose.has_overtone() {
+        if self.in_doubt() {
             return false;
         }
-        let most_px = self.blur_px(MOST_BLUR).max(self.pose.least_blur_px());
-        self.pose.blur_px() < most_px
+        self.pose.blur_px() < self.blur_px(MOST_BLUR)
     }
 
     /// Whether the edges are so sharp that a registration that went astray does not count against them.
@@ -165,7 +172,7 @@ impl Measurement {
                 && phase.sigma_rad_s < COARSE_PHASE_SIGMA * omega.abs()
         });
         let alike = |rate: &f32| (rate - omega).abs() < COARSE_SPREAD * omega.abs();
-        even && (self.rates.iter().all(alike) || self.sharp())
+        even && !self.doubted() && (self.rates.iter().all(alike) || self.sharp())
     }
 }
 

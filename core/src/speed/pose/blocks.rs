@@ -16,6 +16,9 @@ pub const LEAST_SHARE: f32 = 0.05;
 const SHIFT_PRIOR_PX: f32 = 2.0;
 /// How far the path walks from knot to knot that are so far apart, or nearer.
 pub const WALK_US: f32 = 5_000.0;
+/// Farther apart, it walks as much farther, up to these factors: in the first rounds, and in the fine ones.
+pub const MOST_WALK: f32 = 6.0;
+pub const MOST_FINE_WALK: f32 = 1.5;
 pub const WALK_PX: f32 = 0.5;
 /// The same for a rotor with a single mark, whose shift and turn look alike.
 pub const WALK_SINGLE_PX: f32 = 0.05;

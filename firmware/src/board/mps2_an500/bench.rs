@@ -8,7 +8,7 @@ use embassy_sync::zerocopy_channel::{Receiver, Sender};
 use evtach_core::{Reading, Tachometer};
 use evtach_firmware::cost::{Costs, Spent};
 use evtach_firmware::instrument::{Instrument, Picture, Preferences, Sensor, Traffic};
-use evtach_firmware::intake::{self, Block, Pace};
+use evtach_firmware::intake::{self, BLOCKS, Block, Pace};
 use evtach_firmware::measure::{Companion, measure};
 use evtach_firmware::report::Lines;
 use evtach_firmware::sensor::spi::{Acquired, AlwaysReady, Flash, SpiSensor, acquire};
@@ -153,7 +153,7 @@ pub async fn measure_all(
         memory::TACHOMETER_BYTES,
         memory::STORE_BYTES,
         memory::HEAT_BYTES,
-        memory::BLOCKS_BYTES,
+        size_of::<[Block; BLOCKS]>(),
         start_depth.max(run_depth),
     )
     .ok();

@@ -18,6 +18,7 @@ mod fault;
 #[cfg(target_os = "none")]
 mod injection;
 #[cfg(target_os = "none")]
+#[path = "../memory.rs"]
 mod memory;
 #[cfg(target_os = "none")]
 mod pl022;
@@ -28,7 +29,11 @@ mod psram;
 #[cfg(target_os = "none")]
 mod register;
 #[cfg(target_os = "none")]
+#[path = "../stack.rs"]
 mod stack;
+#[cfg(target_os = "none")]
+#[path = "../tape.rs"]
+mod tape;
 #[cfg(target_os = "none")]
 mod timers;
 #[cfg(target_os = "none")]

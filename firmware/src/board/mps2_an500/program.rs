@@ -1,6 +1,6 @@
 //! The instrument: acquire, measure, show, answer, for good.
 
-use core::cell::RefCell;
+use core::cell::{Cell, RefCell};
 use core::fmt::Write as _;
 
 use embassy_futures::block_on;
@@ -9,17 +9,15 @@ use embassy_futures::select::select;
 use embassy_sync::blocking_mutex::Mutex as BlockingMutex;
 use embassy_sync::zerocopy_channel::{Receiver, Sender};
 use embassy_time::Timer;
-use evtach_core::{Geometry, Tachometer};
+use evtach_core::Tachometer;
 use evtach_firmware::cost::Costs;
 use evtach_firmware::instrument::{Fault, Picture, Preferences};
 use evtach_firmware::intake::{Block, Pace};
 use evtach_firmware::kept::KeptFault;
 use evtach_firmware::measure::measure;
-use evtach_firmware::recorder::Recorder;
-use evtach_firmware::scpi::{RecorderFailed, RecorderStatus};
 use evtach_firmware::sensor::spi::{Acquired, AlwaysReady, Flash, SpiSensor, acquire};
 use evtach_firmware::settings::Store;
-use evtach_firmware::tasks::{self, Front, Measuring, Recording, Shared, Task};
+use evtach_firmware::tasks::{self, Front, Measuring, Shared, Task};
 use semihosting::process;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -28,7 +26,8 @@ use crate::fault::{self, fail};
 use crate::injection::{Injection, PowerSupply};
 use crate::memory::Mutex;
 use crate::pl022::{AlwaysSelected, Pl022};
-use crate::psram::{PREFERENCES_BYTES, Panel, Psram, RecordingMemory};
+use crate::psram::{PREFERENCES_BYTES, Panel, Psram};
+use crate::tape::Tape;
 use crate::timers::Ticks;
 use crate::uart::Uart;
 use crate::usage::{self, USERS, User, counted};
@@ -37,36 +36,9 @@ use crate::{stack, watchdog};
 /// What the tasks share.
 pub static SHARED: Shared = Shared::new();
 
-static RECORDER: BlockingMutex<Mutex, RefCell<Option<Recorder<RecordingMemory>>>> =
-    BlockingMutex::new(RefCell::new(None));
-
-/// The recorder, which the measuring task fills and the link reads.
-pub struct Tape;
-
-impl Tape {
-    fn with<T>(work: impl FnOnce(&mut Recorder<RecordingMemory>) -> T) -> Option<T> {
-        RECORDER.lock(|recorder| recorder.borrow_mut().as_mut().map(work))
-    }
-}
-
-impl Recording for Tape {
-    fn status(&self) -> RecorderStatus {
-        Self::with(|recorder| RecorderStatus::from(&*recorder)).unwrap_or_default()
-    }
-
-    fn start(&mut self, geometry: Geometry, events: u32) {
-        Self::with(|recorder| recorder.start(geometry, events));
-    }
-
-    fn stop(&mut self) {
-        Self::with(Recorder::stop);
-    }
-
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), RecorderFailed> {
-        let read = Self::with(|recorder| recorder.read(offset, bytes));
-        read.and_then(Result::ok).ok_or(RecorderFailed)
-    }
-}
+/// What became of the events, for the report.
+static ACQUIRED: BlockingMutex<Mutex, Cell<Acquired>> =
+    BlockingMutex::new(Cell::new(Acquired::NONE));
 
 /// What the front begins with.
 pub struct Parts {
@@ -91,7 +63,7 @@ pub fn prepare(psram: Psram, injection: Injection) -> Parts {
     let (preferences, damaged) = block_on(store.load());
     let damaged = damaged.map(|fault| KeptFault::new(fault, "the stored settings are damaged"));
     let kept = if warm { fault::take_kept() } else { None };
-    RECORDER.lock(|recorder| recorder.replace(Some(Recorder::new(recording))));
+    Tape::lend(recording);
     SHARED.lend(PICTURE.take());
     let front = FRONT.init_with(|| {
         RefCell::new(Front::new(&SHARED, preferences, kept.or(damaged), Tape, panel, "0"))
@@ -110,7 +82,7 @@ pub async fn report_task(seconds: u32) {
         writeln!(console, "used ticks={} name={name}", after - before).ok();
     }
     let (starting, running) = stack::depths();
-    let acquired = SHARED.acquired();
+    let acquired = ACQUIRED.lock(Cell::get);
     writeln!(
         console,
         "{acquired}\nran seconds={seconds} stack_starting={starting} stack_running={running}"
@@ -127,7 +99,10 @@ pub async fn acquire_task(mut blocks: Sender<'static, Mutex, Block>, injection: 
         Err(error) => fail(error),
     };
     let mut sensor = SpiSensor::new(flash, AlwaysReady);
-    let told = |acquired: &Acquired| SHARED.tell_acquired(acquired);
+    let told = |acquired: &Acquired| {
+        ACQUIRED.lock(|cell| cell.set(*acquired));
+        SHARED.tell(acquired.into());
+    };
     let acquiring = acquire(&mut sensor, Pace::Replay, &mut blocks, told);
     counted(User::Acquire, select(acquiring, injection.strike("acquire"))).await;
 }
@@ -138,11 +113,7 @@ pub async fn measure_task(
     mut blocks: Receiver<'static, Mutex, Block>,
     injection: Injection,
 ) {
-    let record = |block: &Block| {
-        // A memory that fails ends the recording, and the link says so.
-        Tape::with(|recorder| recorder.push(block.t_us, block.events()).ok());
-    };
-    let mut measuring = Measuring::new(&SHARED, record);
+    let mut measuring = Measuring::new(&SHARED, Tape::push);
     let mut costs = Costs::new(Ticks);
     let measuring = measure(tachometer, &mut blocks, Pace::Replay, &mut costs, &mut measuring);
     counted(User::Measure, select(measuring, injection.strike("measure"))).await;

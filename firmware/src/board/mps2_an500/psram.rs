@@ -11,10 +11,11 @@ use embedded_graphics::pixelcolor::Rgb565;
 use embedded_graphics::pixelcolor::raw::{LittleEndian, RawU16};
 use embedded_graphics::prelude::*;
 use embedded_graphics::primitives::Rectangle;
-use embedded_storage::{ReadStorage, Storage};
 use evtach_firmware::kept::KEPT_BYTES;
 use evtach_firmware::settings::MemoryFlash;
 use evtach_firmware::tasks;
+
+use crate::tape::RecordingMemory;
 
 /// Where it lies, and what is in it.
 const START: usize = 0x6000_0000;
@@ -77,7 +78,7 @@ pub fn take() -> Option<Psram> {
             preferences.write(Preferences::new([0xff; PREFERENCES_BYTES]));
             cookie.write_volatile(WRITTEN);
         }
-        let (recording, scratch) = (RecordingMemory(()), Scratch(()));
+        let (recording, scratch) = (RecordingMemory::new(RECORDING, RECORDING_BYTES), Scratch(()));
         Some(Psram {
             panel: Panel(&mut *frame),
             preferences: &mut *preferences,
@@ -154,44 +155,4 @@ impl Scratch {
             &mut *place
         }
     }
-}
-
-/// Room for recordings.
-#[derive(Debug)]
-pub struct RecordingMemory(());
-
-impl ReadStorage for RecordingMemory {
-    type Error = Infallible;
-
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Infallible> {
-        let (at, count) = within(offset, bytes.len());
-        // SAFETY: `within` keeps to the memory for recordings, which only `self` names.
-        unsafe {
-            ptr::with_exposed_provenance::<u8>(at)
-                .copy_to_nonoverlapping(bytes.as_mut_ptr(), count);
-        }
-        Ok(())
-    }
-
-    fn capacity(&self) -> usize {
-        RECORDING_BYTES
-    }
-}
-
-impl Storage for RecordingMemory {
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Infallible> {
-        let (at, count) = within(offset, bytes.len());
-        // SAFETY: as above.
-        unsafe {
-            ptr::with_exposed_provenance_mut::<u8>(at)
-                .copy_from_nonoverlapping(bytes.as_ptr(), count);
-        }
-        Ok(())
-    }
-}
-
-/// Address and number of the bytes from `offset` on that the memory holds.
-fn within(offset: u32, count: usize) -> (usize, usize) {
-    let offset = (offset as usize).min(RECORDING_BYTES);
-    (RECORDING + offset, count.min(RECORDING_BYTES - offset))
 }

@@ -1,20 +1,20 @@
 //! From the sensor to blocks of events, and never late: what finds no place is thinned or dropped, and counted.
 
-use core::{fmt, mem};
+use core::fmt;
 
 use embassy_sync::blocking_mutex::raw::RawMutex;
 use embassy_sync::zerocopy_channel::Sender;
 use embassy_time::{Duration, Instant, Timer};
 use embedded_hal_async::digital::Wait;
 use embedded_hal_async::spi::SpiDevice;
-use evtach_core::Geometry;
 
 use super::account::{Account, Lost};
 use super::driver::{LinkError, SILENCE, SpiSensor};
 use super::frame::{Hello, Kind};
 use super::parser::Frame;
 use super::words::Words;
-use crate::intake::{BLOCKS, Block, Pace};
+use crate::intake::{Block, Pace};
+use crate::sensor::outlet::Outlet;
 
 /// Reads without a sound frame after which a recording is held to be over: about 64 KiB.
 const SILENT_READS: u32 = 32;
@@ -28,14 +28,6 @@ const SHARE: u32 = 4;
 
 /// How far ahead of its time a recording may play: a timer for every frame costs as much as a tenth of its events.
 const AHEAD: Duration = Duration::from_millis(1);
-
-/// With more blocks than these waiting to be measured, events are thinned further; with fewer than
-/// the second, less.
-const CROWDED: usize = BLOCKS * 3 / 4;
-const RELAXED: usize = BLOCKS / 2;
-
-/// Thinnest: one event in 16.
-const MOST_STRIDE_LOG2: u32 = 4;
 
 /// How acquisition stands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -108,29 +100,29 @@ pub async fn acquire<D: SpiDevice, R: Wait, M: RawMutex>(
     blocks: &mut Sender<'_, M, Block>,
     mut told: impl FnMut(&Acquired),
 ) -> Result<(), LinkError<D::Error>> {
-    let mut outlet = Outlet::new(blocks, pace);
+    let mut session = Session::new(blocks, pace);
     let mut heard = Instant::now();
     let mut silent_reads = 0;
     let mut rested = Instant::now();
     loop {
         match sensor.read().await {
             Ok(()) => silent_reads += 1,
-            Err(error) if pace.is_endless() => outlet.failed(&error),
+            Err(error) if pace.is_endless() => session.failed(&error),
             Err(error) => return Err(error),
         }
         while let Some(frame) = sensor.next_frame() {
             heard = Instant::now();
             silent_reads = 0;
-            outlet.take(&frame).await;
+            session.take(&frame).await;
         }
-        if outlet.ended || (!pace.is_endless() && silent_reads > SILENT_READS) {
-            outlet.close().await;
-            told(&outlet.acquired);
+        if session.ended || (!pace.is_endless() && silent_reads > SILENT_READS) {
+            session.outlet.close().await;
+            told(&session.acquired);
             return Ok(());
         }
         if silent_reads > 0 && pace.is_endless() {
             if heard.elapsed() > SILENCE {
-                outlet.acquired.sensor = None;
+                session.acquired.sensor = None;
             }
             Timer::after(PAUSE).await;
         } else if pace.is_endless() && rested.elapsed() > PAUSE {
@@ -138,38 +130,30 @@ pub async fn acquire<D: SpiDevice, R: Wait, M: RawMutex>(
             Timer::after(PAUSE / SHARE).await;
             rested = Instant::now();
         }
-        told(&outlet.acquired);
+        told(&session.acquired);
     }
 }
 
-/// Where events go.
-struct Outlet<'o, 'b, M: RawMutex> {
-    blocks: &'o mut Sender<'b, M, Block>,
+/// What is known of the sensor, and where its events go.
+struct Session<'o, 'b, M: RawMutex> {
+    outlet: Outlet<'o, 'b, M>,
     pace: Pace,
     acquired: Acquired,
     /// What the sensor said last that it is, even if it is silent now.
     hello: Option<Hello>,
-    /// Lost since the last block, to be told with the next.
-    lost: u64,
-    stride_log2: u32,
-    /// Events so far, to keep one in so many.
-    phase: u32,
     /// Our time and the recording's at its first frame.
     origin: Option<(Instant, u64)>,
     /// Whether a recording has come to its end.
     ended: bool,
 }
 
-impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
-    fn new(blocks: &'o mut Sender<'b, M, Block>, pace: Pace) -> Self {
+impl<'o, 'b, M: RawMutex> Session<'o, 'b, M> {
+    const fn new(blocks: &'o mut Sender<'b, M, Block>, pace: Pace) -> Self {
         Self {
-            blocks,
+            outlet: Outlet::new(blocks, pace.can_wait()),
             pace,
-            acquired: Acquired::default(),
+            acquired: Acquired::NONE,
             hello: None,
-            lost: 0,
-            stride_log2: 0,
-            phase: 0,
             origin: None,
             ended: false,
         }
@@ -189,7 +173,7 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
         let Some(hello) = self.hello else { return };
         self.acquired.sensor = Some(hello);
         self.acquired.latest_us = frame.header.t_us;
-        self.lost += self.acquired.account.frame(frame);
+        self.outlet.lost += self.acquired.account.frame(frame);
         match frame.header.kind {
             Kind::Hello => {}
             Kind::End if self.pace.is_endless() => {
@@ -199,7 +183,10 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
             Kind::End => self.ended = true,
             Kind::Evt2 | Kind::Evt3 => {
                 self.keep_pace(frame.header.t_us).await;
-                self.deliver(frame, hello.geometry).await;
+                let events = self.outlet.deliver(Words::new(frame), hello.geometry).await;
+                self.acquired.account.events(events);
+                self.acquired.thinned = self.outlet.delivered.thinned;
+                self.acquired.overrun = self.outlet.delivered.overrun;
             }
         }
     }
@@ -214,71 +201,5 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
                 Timer::at(due).await;
             }
         }
-    }
-
-    /// Hands the events of a frame on, in one block or more.
-    async fn deliver(&mut self, frame: &Frame<'_>, geometry: Geometry) {
-        let mut words = Words::new(frame);
-        let mut events = 0_u32;
-        while !words.is_done() {
-            let slot = if self.pace.can_wait() {
-                Some(self.blocks.send().await)
-            } else {
-                self.thin_by_crowd();
-                self.blocks.try_send()
-            };
-            let Some(slot) = slot else {
-                let before = events;
-                words.decode(usize::MAX, |_| events += 1);
-                self.acquired.overrun += u64::from(events - before);
-                self.lost += u64::from(events - before);
-                break;
-            };
-            slot.clear();
-            while !words.is_done() {
-                let room = slot.space().len();
-                if room < words.most_events_a_word() {
-                    break;
-                }
-                let (before, count) = (slot.events().len(), words.pack(slot.space()));
-                slot.filled(count);
-                events += count as u32;
-                if self.stride_log2 > 0 {
-                    let mask = (1 << self.stride_log2) - 1;
-                    let phase = &mut self.phase;
-                    let went = slot.retain(before, || {
-                        *phase = phase.wrapping_add(1);
-                        *phase & mask == 0
-                    });
-                    self.acquired.thinned += went as u64;
-                }
-            }
-            if let Some(first) = slot.events().first() {
-                slot.t_us = first.unpack(frame.header.t_us).t_us;
-                slot.geometry = geometry;
-                slot.lost = mem::take(&mut self.lost);
-                slot.last = false;
-                self.blocks.send_done();
-            }
-        }
-        self.acquired.account.events(events);
-    }
-
-    fn thin_by_crowd(&mut self) {
-        let waiting = self.blocks.len();
-        if waiting > CROWDED {
-            self.stride_log2 = (self.stride_log2 + 1).min(MOST_STRIDE_LOG2);
-        } else if waiting < RELAXED {
-            self.stride_log2 = self.stride_log2.saturating_sub(1);
-        }
-    }
-
-    /// Marks the end of a recording.
-    async fn close(&mut self) {
-        let slot = self.blocks.send().await;
-        slot.clear();
-        slot.lost = mem::take(&mut self.lost);
-        slot.last = true;
-        self.blocks.send_done();
     }
 }

@@ -5,6 +5,7 @@ use evtach_core::{Event, PackedEvent};
 
 use super::frame::Kind;
 use super::parser::Frame;
+use crate::sensor::outlet::{self, Filled};
 
 /// Most events that one word of EVT 3 stands for: a vector.
 const VECTOR_EVENTS: usize = 12;
@@ -20,6 +21,8 @@ pub struct Words<'f> {
     rest: &'f [u8],
     /// What the words' clock leaves out of the time.
     base_us: u64,
+    /// Time of the first event.
+    first_us: u64,
     decoder: Decoder,
 }
 
@@ -40,7 +43,8 @@ impl<'f> Words<'f> {
             Kind::Evt3 => (Decoder::Evt3(Evt3::new()), EVT3_SPAN_US),
             Kind::Hello | Kind::End => (Decoder::None, 1),
         };
-        Self { rest: frame.payload, base_us: frame.header.t_us & !(span_us - 1), decoder }
+        let first_us = frame.header.t_us;
+        Self { rest: frame.payload, base_us: first_us & !(span_us - 1), first_us, decoder }
     }
 
     /// Most events that one of these words stands for: with fewer places, [`Words::pack`] does nothing.
@@ -95,6 +99,17 @@ impl<'f> Words<'f> {
             }
             Decoder::None => self.rest = &[],
         }
+    }
+}
+
+/// A bridge sends no gyro samples.
+impl outlet::Words for Words<'_> {
+    fn is_done(&self) -> bool {
+        self.is_done()
+    }
+
+    fn fill(&mut self, space: &mut [PackedEvent]) -> Filled {
+        Filled { events: self.pack(space), near_us: self.first_us, sample: None }
     }
 }
 

@@ -22,8 +22,8 @@ pub struct Args {
 
 /// What the device is to stay within.
 const ASKED_INSTRUCTIONS_PER_S: u64 = 150_000_000;
-const ASKED_RAM_BYTES: u64 = 320 * 1024;
-const ASKED_FLASH_BYTES: u64 = 256 * 1024;
+pub(super) const ASKED_RAM_BYTES: u64 = 320 * 1024;
+pub(super) const ASKED_FLASH_BYTES: u64 = 256 * 1024;
 
 /// Readings of each of four rotors a second.
 const ASKED_READINGS_OF_FOUR: u32 = 4;

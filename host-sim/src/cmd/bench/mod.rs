@@ -8,6 +8,7 @@ mod blind;
 mod budget;
 mod decode;
 mod drive;
+mod image;
 mod peers;
 mod report;
 mod score;
@@ -31,6 +32,8 @@ enum Table {
     Cost(cost::Args),
     /// Instructions a second of the whole instrument, its RAM and flash, against their limits.
     Budget(budget::Args),
+    /// What the image for the STM32F746G-DISCO takes of flash and RAM; writes it as it is dragged onto the board's drive.
+    Image(image::Args),
     /// Events decoded a second, for each format, beside faery.
     Decode(decode::Args),
     /// Relative error by speed, distance, blades, hand and vibration: the paper's evaluations.
@@ -66,7 +69,7 @@ pub struct Common {
 /// Runs the subcommand.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let common = match &args.table {
-        Table::Cost(_) | Table::Budget(_) | Table::Decode(_) => None,
+        Table::Cost(_) | Table::Budget(_) | Table::Image(_) | Table::Decode(_) => None,
         Table::Accuracy(args) => Some(args.common),
         Table::Blind(args) => Some(args.common),
         Table::Peers(args) => Some(args.common),
@@ -78,6 +81,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let report = match args.table {
         Table::Cost(args) => return cost::run(args),
         Table::Budget(args) => return budget::run(&args),
+        Table::Image(args) => return image::run(&args),
         Table::Decode(args) => return decode::run(&args),
         Table::Accuracy(args) => accuracy::run(&args)?,
         Table::Blind(args) => blind::run(&args)?,

@@ -1,7 +1,6 @@
 use core::convert::Infallible;
 use core::future::pending;
 
-use embassy_futures::block_on;
 use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::zerocopy_channel::{Channel, Receiver, Sender};
@@ -13,6 +12,7 @@ use embedded_hal_async::spi::{ErrorType, Operation, SpiBus, SpiDevice};
 use super::*;
 use crate::intake::{BLOCKS, Block, Pace};
 use crate::record::Decoder;
+use crate::test_time::block_on;
 
 /// A bus behind which lie bytes; after them it shifts in ones, as one with nobody on it.
 struct Wire {
@@ -237,9 +237,9 @@ fn nobody_measures_and_acquiring_goes_on_thinned_and_counted() {
 #[test]
 fn a_sensor_that_goes_is_told_absent_and_one_that_comes_back_is_read_on() {
     let bytes = frames(Kind::Evt2, &events(20_000)).concat();
-    let line = Line { reads: 10, back_at: Instant::now() + SILENCE * 2 };
     let (mut seen, mut received) = (Vec::new(), Vec::new());
     with_blocks(async |mut sender, _receiver| {
+        let line = Line { reads: 10, back_at: Instant::now() + SILENCE * 2 };
         let mut sensor = SpiSensor::new(Wire::new(bytes), line);
         let told = |now: &Acquired| {
             if seen.last() != Some(&now.sensor.is_some()) {

@@ -13,7 +13,8 @@ pub type Mutex = CriticalSectionRawMutex;
 static BUFFERS: ConstStaticCell<[Block; BLOCKS]> =
     ConstStaticCell::new([const { Block::EMPTY }; BLOCKS]);
 static CHANNEL: StaticCell<Channel<'_, Mutex, Block>> = StaticCell::new();
-static STORE: StaticCell<[StoredEvent; DEVICE_EVENTS]> = StaticCell::new();
+/// The store, or, where nothing can be measured, what a board makes of it.
+pub static STORE: StaticCell<[StoredEvent; DEVICE_EVENTS]> = StaticCell::new();
 static HEAT: ConstStaticCell<[u16; DEVICE_HEAT_CELLS]> =
     ConstStaticCell::new([0; DEVICE_HEAT_CELLS]);
 static WEIGHTS: ConstStaticCell<[u8; DEVICE_HEAT_CELLS]> =
@@ -29,9 +30,6 @@ pub const STORE_BYTES: usize = size_of::<[StoredEvent; DEVICE_EVENTS]>();
 /// Bytes of the heat map and its weights.
 pub const HEAT_BYTES: usize =
     size_of::<[u16; DEVICE_HEAT_CELLS]>() + size_of::<[u8; DEVICE_HEAT_CELLS]>();
-
-/// Bytes of the blocks between acquiring and measuring.
-pub const BLOCKS_BYTES: usize = size_of::<[Block; BLOCKS]>();
 
 // What the core may take of the 320 KB: the rest is for screen, links and stack.
 const _: () = {

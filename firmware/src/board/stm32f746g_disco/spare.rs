@@ -1,0 +1,77 @@
+//! A screen without SDRAM: eight bits a pixel, in the memory of the events, which are not measured then.
+#![expect(unsafe_code, reason = "memory as bytes that is handed out once")]
+
+use core::convert::Infallible;
+use core::mem::MaybeUninit;
+
+use embassy_stm32::ltdc;
+use embedded_graphics::pixelcolor::Rgb565;
+use embedded_graphics::prelude::*;
+
+use crate::memory::{STORE, STORE_BYTES};
+use crate::panel::{HEIGHT, WIDTH};
+
+const PIXELS: usize = WIDTH * HEIGHT;
+
+const _: () = assert!(PIXELS <= STORE_BYTES);
+
+/// The colours of the pixels: three bits of red, three of green, two of blue.
+pub const COLOURS: [ltdc::RgbColor; 256] = {
+    let mut colours = [ltdc::RgbColor { red: 0, green: 0, blue: 0 }; 256];
+    let mut code = 0;
+    while code < 256 {
+        let (red, green, blue) = (code >> 5, code >> 2 & 7, code & 3);
+        colours[code] = ltdc::RgbColor {
+            red: (red * 255 / 7) as u8,
+            green: (green * 255 / 7) as u8,
+            blue: (blue * 255 / 3) as u8,
+        };
+        code += 1;
+    }
+    colours
+};
+
+/// The pixels.
+pub struct Spare(&'static mut [u8; PIXELS]);
+
+/// Takes the memory of the events. The data cache must be off: the display does not see what is in it.
+pub fn take() -> Spare {
+    let store = core::ptr::from_mut(STORE.uninit()).cast::<MaybeUninit<[u8; PIXELS]>>();
+    // SAFETY: the memory is as large (see above), has no other name any more, and zeros are pixels.
+    unsafe {
+        store.write_bytes(0, 1);
+        Spare((*store).assume_init_mut())
+    }
+}
+
+impl Spare {
+    /// Where it lies.
+    pub fn address(&self) -> usize {
+        self.0.as_ptr().expose_provenance()
+    }
+}
+
+impl OriginDimensions for Spare {
+    fn size(&self) -> Size {
+        Size::new(WIDTH as u32, HEIGHT as u32)
+    }
+}
+
+impl DrawTarget for Spare {
+    type Color = Rgb565;
+    type Error = Infallible;
+
+    fn draw_iter<I>(&mut self, pixels: I) -> Result<(), Infallible>
+    where
+        I: IntoIterator<Item = Pixel<Rgb565>>,
+    {
+        for Pixel(Point { x, y }, colour) in pixels {
+            let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { continue };
+            if x < WIDTH && y < HEIGHT {
+                let code = colour.r() >> 2 << 5 | colour.g() >> 3 << 2 | colour.b() >> 3;
+                self.0[y * WIDTH + x] = code;
+            }
+        }
+        Ok(())
+    }
+}
