@@ -1,6 +1,6 @@
 //! The device as the link sees it.
 
-use evtach_core::{Geometry, Reading, Reason};
+use evtach_core::{Geometry, Reading, Reason, Status};
 
 use super::front::{Front, Panel, Recording};
 use crate::instrument::{Action, Fault, Mode, Preferences, Sensor, State};
@@ -21,15 +21,20 @@ impl<R: Recording, P: Panel> Device for Front<R, P> {
     }
 
     fn reading(&self) -> Option<&Reading> {
+        let reading = self.instrument.reading()?;
         let shown = match self.instrument.state() {
             State::Locked | State::Coarse | State::Held => true,
             State::Fault(_) => false,
-            State::Refused(reason) => !matches!(
-                reason,
-                Reason::NoSensor | Reason::NoEvents | Reason::Searching | Reason::Fault
-            ),
+            State::Refused(
+                Reason::NoSensor | Reason::NoEvents | Reason::Searching | Reason::Fault,
+            ) => false,
+            // Told of a reading, or because none has come while most events were lost.
+            State::Refused(Reason::Saturated) => {
+                reading.status == Status::Refused(Reason::Saturated)
+            }
+            State::Refused(_) => true,
         };
-        self.instrument.reading().filter(|_| shown)
+        shown.then_some(reading)
     }
 
     fn reason(&self) -> Reason {
