@@ -31,14 +31,14 @@ fuzz_target!(|data: &[u8]| {
     let transfer = usize::from(first / 2 + 1) * 2;
     assert_eq!(decode(model, false, bytes.chunks(transfer)), (sent.clone(), 0));
 
-    // Three bytes are damage: where, and what. Cut at any byte.
+    // Three bytes are damage: where, and what. Cut at any byte. Nothing is asked of the times: wrap words that are damage
+    // may leap beyond the half hour within which a packed event's time is known.
     for damage in data.chunks_exact(3) {
         let at = usize::from(u16::from_le_bytes([damage[0], damage[1]])) % bytes.len();
         bytes[at] ^= damage[2];
     }
     for bytes in [&bytes[..], data] {
         let (events, _) = decode(model, true, bytes.chunks(transfer - 1));
-        assert!(events.windows(2).all(|pair| pair[0].t_us <= pair[1].t_us));
         assert!(events.len() <= bytes.len() / 2 * if davis { 1 } else { 8 });
     }
 });
