@@ -39,7 +39,7 @@ impl Piece {
     }
 }
 
-/// A straight line through all readings; with less than three it is level.
+/// A straight line through all readings; less than three are no line, and what they tell of acceleration is its slope.
 struct Line {
     origin_us: u64,
     t_mean_s: f64,
@@ -58,7 +58,9 @@ impl Line {
         let tt: f64 = pieces.iter().map(|p| (t_s(p) - t_mean_s).powi(2)).sum();
         let ty: f64 =
             pieces.iter().map(|p| (t_s(p) - t_mean_s) * (p.omega_rad_s() - mean_rad_s)).sum();
-        let slope_rad_s2 = if pieces.len() >= 3 && tt > 0.0 { ty / tt } else { 0.0 };
+        let told = pieces.iter().filter_map(|p| p.speed.alpha_rad_s2).map(f64::from);
+        let slope_rad_s2 =
+            if pieces.len() >= 3 && tt > 0.0 { ty / tt } else { told.sum::<f64>() / n };
         Self { origin_us, t_mean_s, mean_rad_s, slope_rad_s2, tt }
     }
 
@@ -104,8 +106,12 @@ pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) 
     }
     let sigma_rad_s = (turn_variance / (whole_s * whole_s) + clock).sqrt();
 
-    // A slope is told only where it stands out of the error of the single readings.
-    let told = line.slope_rad_s2.abs() * line.tt.sqrt() > 4.0 * OVERLAP.sqrt() * variance.sqrt();
+    // A slope is told only where it stands out of the error of the single readings, or where these told it themselves.
+    let told = if pieces.len() >= 3 {
+        line.slope_rad_s2.abs() * line.tt.sqrt() > 4.0 * OVERLAP.sqrt() * variance.sqrt()
+    } else {
+        line.slope_rad_s2 != 0.0
+    };
     Some(Speed {
         omega_rad_s: (turn_rad / whole_s) as f32,
         omega_sigma_rad_s: sigma_rad_s as f32,
@@ -187,6 +193,21 @@ mod tests {
         let turn_rad = |t: f64| 230.0 * t + 5.0 * t * t;
         let (mean_rad_s, _) = mean(turn_rad, 640);
         assert!((mean_rad_s - turn_rad(0.64) / 0.64).abs() < 1e-3, "{mean_rad_s}");
+    }
+
+    #[test]
+    fn a_single_reading_goes_on_as_it_told() {
+        let speed = Speed {
+            omega_rad_s: 200.0,
+            omega_sigma_rad_s: 0.01,
+            alpha_rad_s2: Some(10.0),
+            frame: Frame::Camera,
+        };
+        let pieces = [Piece { window_us: 0..300_000, speed }];
+        let mean = mean_speed(&pieces, &(0..900_000), 0.0).expect("a reading");
+        // 200 rad/s at 0.15 s, and so 203 at the middle.
+        assert!((mean.omega_rad_s - 203.0).abs() < 1e-3, "{}", mean.omega_rad_s);
+        assert_eq!(mean.alpha_rad_s2, Some(10.0));
     }
 
     #[test]
