@@ -18,7 +18,7 @@ const HARMONICS: usize = 24;
 const RINGS: usize = 4;
 const BANKS: usize = 2 * RINGS;
 /// Least score of a symmetry, else the rotor has one part.
-const LEAST_SCORE: f32 = 0.06;
+const LEAST_SCORE: f32 = 0.08;
 /// The largest count within this share of the best score wins: six blades also repeat like three and two.
 const CLOSE_TO_BEST: f32 = 0.85;
 /// Largest count that is tried: beyond [`MAX_BLADES`] only to say that it is beyond.
