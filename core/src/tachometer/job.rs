@@ -40,7 +40,7 @@ impl Tachometer<'_> {
         self.job = Job::Search(Extraction::default());
     }
 
-    /// Advances the measurement by at most `steps` steps, each of a few million instructions at most (`evtach bench cost`).
+    /// Advances the measurement by at most `steps` steps, each of less than a million instructions with the device's memory (`evtach bench cost`).
     pub fn poll(&mut self, steps: u32) -> Poll {
         for _ in 0..steps {
             if self.window_segments == 0 {
@@ -129,8 +129,9 @@ impl Tachometer<'_> {
             self.job = Job::Idle;
             return true;
         };
-        if !matches!(self.scratch, Scratch::Measure(_)) {
-            self.scratch = Scratch::Measure(Bench::EMPTY);
+        match &mut self.scratch {
+            Scratch::Measure(bench) => bench.clear(),
+            Scratch::Search(_) => self.scratch = Scratch::Measure(Bench::EMPTY),
         }
         let Suspect { found, followed } = self.candidates[next];
         let measurement = match followed {
