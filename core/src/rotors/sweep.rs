@@ -18,7 +18,7 @@ const FIRST: usize = 3;
 const FREQUENCIES: usize = 14;
 /// Events that are looked at, and those in one step: half a million instructions.
 const MOST_EVENTS: usize = 1_024;
-const EVENTS_A_STEP: usize = 256;
+const EVENTS_A_STEP: usize = 512;
 /// Power over that of unrelated events from which on a frequency is looked into.
 const LEAST_POWER: f32 = 12.0;
 /// Frequencies given.

@@ -68,7 +68,7 @@ impl Tachometer<'_> {
                     for candidate in extraction.candidates() {
                         self.candidates.push(Suspect { found: *candidate, followed: None }).ok();
                     }
-                    return self.measure_next(0);
+                    self.measure_next(0);
                 }
                 false
             }
@@ -91,7 +91,8 @@ impl Tachometer<'_> {
                     return false;
                 }
                 self.keep(outcome);
-                self.measure_next(index + 1)
+                self.measure_next(index + 1);
+                false
             }
         }
     }
@@ -118,8 +119,9 @@ impl Tachometer<'_> {
         }
     }
 
-    /// Starts measuring the next candidate from `index` on that no measured rotor overlaps; `true` when none is left.
-    fn measure_next(&mut self, index: usize) -> bool {
+    /// Starts measuring the next candidate from `index` on that no measured rotor overlaps; where none is left, what remains is to
+    /// conclude, in a step of its own.
+    fn measure_next(&mut self, index: usize) {
         let taken = |disc: &Disc| {
             let measured = |o: &&Outcome| o.status.reason().is_none();
             self.outcomes.iter().filter(measured).any(|o| o.found.disc.overlaps(disc))
@@ -127,7 +129,7 @@ impl Tachometer<'_> {
         let next = (index..self.candidates.len()).find(|i| !taken(&self.candidates[*i].found.disc));
         let Some(next) = next else {
             self.job = Job::Idle;
-            return true;
+            return;
         };
         match &mut self.scratch {
             Scratch::Measure(bench) => bench.clear(),
@@ -139,6 +141,5 @@ impl Tachometer<'_> {
             None => Measurement::new(&found),
         };
         self.job = Job::Measure(next, measurement);
-        false
     }
 }
