@@ -36,7 +36,7 @@ pub struct Spare(&'static mut [u8; PIXELS]);
 
 /// Takes the memory of the events. The data cache must be off: the display does not see what is in it.
 pub fn take() -> Spare {
-    let store = core::ptr::from_mut(STORE.uninit()).cast::<MaybeUninit<[u8; PIXELS]>>();
+    let store = core::ptr::from_mut(STORE.take()).cast::<MaybeUninit<[u8; PIXELS]>>();
     // SAFETY: the memory is as large (see above), has no other name any more, and zeros are pixels.
     unsafe {
         store.write_bytes(0, 1);
