@@ -304,7 +304,7 @@ impl Extraction {
         self.stage = Stage::Slow;
         let (Some(line), Some(disc)) = (self.lines.pop(), self.swept) else { return self.end() };
         self.line = line;
-        self.look(view, disc, |_| true, scratch);
+        self.look(view, disc, &|_| true, scratch);
     }
 
     /// One step of the look for the rotation of all that moves.
@@ -341,7 +341,7 @@ impl Extraction {
         let mut one = KMeans::seed(cells, 1, Seeding::FarthestMean);
         one.sweep(cells);
         if let Some(all) = without_outliers(cells, one.clusters(), 0) {
-            self.look(view, all, |_| true, scratch);
+            self.look(view, all, &|_| true, scratch);
             self.stage = Stage::Whole;
         }
     }
@@ -352,12 +352,12 @@ impl Extraction {
         Cells { grid: self.grid, weights, floor: 0 }
     }
 
-    /// Starts to look for the rotation that explains a disc.
+    /// Starts to look for the rotation that explains a disc. One function for all callers: each would be 2 KB.
     fn look(
         &mut self,
         view: &View<'_>,
         disc: Disc,
-        mine: impl Fn(&Phasor) -> bool,
+        mine: &dyn Fn(&Phasor) -> bool,
         scratch: &mut Scratch,
     ) {
         let half_px = LOCAL_SHARE * disc.radius_px + self.grid.cell_px();
@@ -427,7 +427,7 @@ impl Extraction {
                 let best = self.best.clone();
                 let number = self.part;
                 let mine = |p: &Phasor| nearest(&best, p.x_px, p.y_px).0 == number;
-                self.look(view, part, mine, scratch);
+                self.look(view, part, &mine, scratch);
                 return;
             }
             self.part += 1;
