@@ -264,6 +264,8 @@ impl Extraction {
         self.stage = Stage::Visits;
     }
 
+    // Not inlined: it is called in eight places.
+    #[inline(never)]
     fn end(&mut self) {
         if self.candidates.is_empty() && self.stage != Stage::Slow && self.swept.is_none() {
             self.stage = Stage::Sweep;
@@ -473,6 +475,8 @@ impl Extraction {
     }
 
     /// Enters a candidate; when the list is full, in place of the one that explains least.
+    // Nor this, in four.
+    #[inline(never)]
     fn enter(&mut self, candidate: Found) {
         if let Err(candidate) = self.candidates.push(candidate)
             && let Some(least) =
