@@ -49,8 +49,9 @@ impl Scratch {
 
     #[inline(never)]
     pub(super) fn ready_for_measuring(&mut self) {
-        if !matches!(self, Self::Measure(_)) {
-            *self = Self::Measure(Bench::EMPTY);
+        match self {
+            Self::Measure(bench) => bench.clear(),
+            Self::Search(_) => *self = Self::Measure(Bench::EMPTY),
         }
     }
 }
