@@ -340,6 +340,8 @@ impl Extraction {
         self.stage = Stage::Visits;
     }
 
+    // Not inlined: it is called in eight places.
+    #[inline(never)]
     fn end(&mut self) {
         if self.candidates.is_empty() && self.swept.is_none() {
             self.grid = CellGrid::default();
@@ -686,6 +688,8 @@ impl Extraction {
     }
 
     /// Enters a candidate; when the list is full, in place of the one that explains least.
+    // Nor this, in four.
+    #[inline(never)]
     fn enter(&mut self, candidate: Found) {
         if let Err(candidate) = self.candidates.push(candidate)
             && let Some(least) =

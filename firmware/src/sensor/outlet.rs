@@ -113,12 +113,7 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
                 events += count as u32;
                 let before = slot.events().len() - count;
                 if self.stride_log2 > 0 {
-                    let mask = (1 << self.stride_log2) - 1;
-                    let phase = &mut self.phase;
-                    let went = slot.retain(before, || {
-                        *phase = phase.wrapping_add(1);
-                        *phase & mask == 0
-                    });
+                    let went = slot.thin(before, self.stride_log2, &mut self.phase);
                     self.delivered.thinned += went as u64;
                 }
                 if before == 0
