@@ -317,7 +317,9 @@ impl Pose {
         let even = (events as f32 * self.even_share) as usize;
         let most = (even / BLOCK_EVENTS).min(self.schedule.blocks());
         let most = most.clamp(LEAST_BLOCKS, MAX_KNOTS - 1) as f32;
-        let shortest = (self.window_us / most).max(SHORTEST_BLOCK_US);
+        // In a short window a hand does little, and a trend still needs its points.
+        let still_us = SHORTEST_BLOCK_US.min(self.window_us / (2 * LEAST_BLOCKS) as f32);
+        let shortest = (self.window_us / most).max(still_us);
         let split = libm::floorf((self.period_us / shortest).min(MOST_IN_PERIOD));
         let step_us = if split >= 1.0 {
             self.period_us / split
