@@ -50,6 +50,8 @@ const MOST_CELL_SHARE: f32 = 0.3;
 /// Events of its own polarity that an event shares its cell with on average, at least, and the largest cells for that.
 const LEAST_COMPANY: f32 = 3.0;
 const COARSEST_LOG2: u8 = 4;
+/// In a quarter that is mostly noise a rotor's cells have more company than the average, but not below this.
+const HOPELESS_COMPANY: f32 = 0.5;
 /// Fewest events that are searched.
 const LEAST_EVENTS: usize = 100;
 /// Quarters of the picture that are searched after the whole of it: half of its width and height, in steps of half of that.
@@ -59,6 +61,9 @@ const QUARTERS: usize = QUARTERS_A_SIDE * QUARTERS_A_SIDE;
 /// own in all of them.
 const QUARTER_LOOKS: usize = 8;
 const QUARTERS_A_LINE: usize = 2;
+/// In a quarter a cell counts as much as it has events, up to so many: a rotor has more of them than noise, and what is as bright
+/// as it was found in the whole.
+const MOST_WEIGHT: usize = 8;
 
 /// A rotor as extraction sees it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -116,6 +121,8 @@ pub struct Extraction {
     least_log2: u8,
     /// Cells of the visits: as fine as the events allow.
     grid: CellGrid,
+    /// Whether larger cells would show what these do not.
+    lonely: bool,
     /// Grid of the local map at hand.
     local: CellGrid,
     /// What one rotation explains of the whole map.
@@ -215,21 +222,30 @@ impl Extraction {
         if events < LEAST_EVENTS {
             return if self.quarter == 0 { self.end() } else { self.next_quarter() };
         }
-        if company < LEAST_COMPANY && self.grid.cell_log2 < COARSEST_LOG2 {
+        self.lonely = company < LEAST_COMPANY && self.grid.cell_log2 < COARSEST_LOG2;
+        if self.lonely && (self.quarter == 0 || company < HOPELESS_COMPANY) {
             self.grid = self.grid.coarser();
             return;
         }
         if self.quarter == 0 {
             let capped = events > VISITS / 4 * 3;
-            self.least_log2 = self.grid.cell_log2.saturating_sub(u8::from(capped)).max(2);
+            let least_log2 = self.grid.cell_log2.saturating_sub(u8::from(capped)).max(2);
+            let first = self.taken.is_empty();
+            self.least_log2 = if first { least_log2 } else { least_log2.min(self.least_log2) };
         }
         spectrum.clear();
         self.stage = Stage::Lags;
     }
 
     fn lags(&mut self, view: &View<'_>, spectrum: &mut Spectrum, scratch: &mut Scratch) {
-        if scratch.visits.step(spectrum.lags()) {
-            self.lines = spectrum.lines(scratch.visits.banks(), view.window.duration_us);
+        let most_weight = if self.quarter == 0 { 1 } else { MOST_WEIGHT };
+        if scratch.visits.step(spectrum.lags(), most_weight) {
+            self.lines = spectrum.lines(scratch.visits.chance(), view.window.duration_us);
+            if self.lines.is_empty() && self.lonely {
+                self.grid = self.grid.coarser();
+                self.stage = Stage::Visits;
+                return;
+            }
             self.lines.reverse();
             self.stage = Stage::Map;
         }

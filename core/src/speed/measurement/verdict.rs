@@ -119,8 +119,7 @@ impl Measurement {
         // Where the parts were not counted, they are at least as many as the windings of the line.
         let parts = if self.parts.is_none() { self.windings.max(1) } else { 1 };
         let half_way = 0.5 * FRACTION / (self.windings as f32 + 1.0);
-        let most =
-            if self.doubted() { half_way.max(MOST_DEVIATION) } else { MOST_CLEAR_DEVIATION };
+        let most = if self.doubted() { half_way.max(MOST_DEVIATION) } else { MOST_CLEAR_DEVIATION };
         self.evidence.fractional_deviation.is_some_and(|d| d * (parts as f32) < most)
     }
 
@@ -144,8 +143,7 @@ impl Measurement {
     /// Whether the edges are so sharp that a registration that went astray does not count against them. Noise, which leads it
     /// astray, is no blur where no other harmonic keeps step.
     pub(super) fn sharp(&self) -> bool {
-        let blur_px =
-            if self.doubted() { self.pose.sharpness_px() } else { self.pose.blur_px() };
+        let blur_px = if self.doubted() { self.pose.sharpness_px() } else { self.pose.blur_px() };
         blur_px < self.blur_px(LEAST_BLUR)
     }
 
