@@ -27,8 +27,9 @@ use super::winding::Explainer;
 use crate::event::Geometry;
 use crate::limits::{
     COHERENCE_CELLS, MAX_CANDIDATES, MAX_CLUSTERS, MAX_LINES, MAX_ROTORS, VISIT_CELLS, VISITS,
+    WINDING_PHASORS,
 };
-use crate::math::{TAU, sqrt};
+use crate::math::{TAU, TurnRate, sqrt};
 use crate::order::sort_few;
 use crate::speed::polar::{PolarTrack, track};
 use crate::store::{StoredEvent, Window};
@@ -50,6 +51,9 @@ const MOST_CELL_SHARE: f32 = 0.3;
 /// Events of its own polarity that an event shares its cell with on average, at least, and the largest cells for that.
 const LEAST_COMPANY: f32 = 3.0;
 const COARSEST_LOG2: u8 = 4;
+/// In a quarter, the same beyond which finer cells are tried first, and the finest.
+const MUCH_COMPANY: f32 = 6.0;
+const FINEST_LOG2: u8 = 2;
 /// In a quarter that is mostly noise a rotor's cells have more company than the average, but not below this.
 const HOPELESS_COMPANY: f32 = 0.5;
 /// Fewest events that are searched.
@@ -61,6 +65,8 @@ const QUARTERS: usize = QUARTERS_A_SIDE * QUARTERS_A_SIDE;
 /// own in all of them.
 const QUARTER_LOOKS: usize = 8;
 const QUARTERS_A_LINE: usize = 2;
+/// Cells with a phase below which a disc in a quarter is also looked at event by event.
+const FEW_PHASORS: usize = 32;
 /// In a quarter a cell counts as much as it has events, up to so many: a rotor has more of them than noise, and what is as bright
 /// as it was found in the whole.
 const MOST_WEIGHT: usize = 8;
@@ -123,6 +129,8 @@ pub struct Extraction {
     grid: CellGrid,
     /// Whether larger cells would show what these do not.
     lonely: bool,
+    /// Whether the cells of this quarter have been made finer.
+    finer: bool,
     /// Grid of the local map at hand.
     local: CellGrid,
     /// What one rotation explains of the whole map.
@@ -173,7 +181,7 @@ impl Extraction {
             Stage::Visits => self.visits(view, spectrum, scratch),
             Stage::Lags => self.lags(view, spectrum, scratch),
             Stage::Map => self.map(view, scratch),
-            Stage::Whole => self.whole(scratch),
+            Stage::Whole => self.whole(view, scratch),
             Stage::Split => self.split(view, scratch),
             Stage::Part => self.part(view, scratch),
             Stage::Sweep => self.sweep(view, track, scratch),
@@ -216,7 +224,8 @@ impl Extraction {
             return self.end();
         }
         if self.grid.is_empty() {
-            self.grid = self.finest(view);
+            self.grid = self.cells_of(view, self.least_log2);
+            self.finer = false;
         }
         let (events, company) = scratch.visits.fill(&view.window, self.grid, &self.taken);
         if events < LEAST_EVENTS {
@@ -225,6 +234,13 @@ impl Extraction {
         self.lonely = company < LEAST_COMPANY && self.grid.cell_log2 < COARSEST_LOG2;
         if self.lonely && (self.quarter == 0 || company < HOPELESS_COMPANY) {
             self.grid = self.grid.coarser();
+            return;
+        }
+        let finer = self.quarter > 0 && !self.finer && company > MUCH_COMPANY;
+        if finer && self.grid.cell_log2 > FINEST_LOG2 {
+            // Many small blades pass side by side.
+            self.finer = true;
+            self.grid = self.cells_of(view, self.grid.cell_log2 - 1);
             return;
         }
         if self.quarter == 0 {
@@ -241,7 +257,8 @@ impl Extraction {
         let most_weight = if self.quarter == 0 { 1 } else { MOST_WEIGHT };
         if scratch.visits.step(spectrum.lags(), most_weight) {
             self.lines = spectrum.lines(scratch.visits.chance(), view.window.duration_us);
-            if self.lines.is_empty() && self.lonely {
+            let too_fine = self.lonely || self.finer && self.grid.cell_log2 < self.least_log2;
+            if self.lines.is_empty() && too_fine {
                 self.grid = self.grid.coarser();
                 self.stage = Stage::Visits;
                 return;
@@ -251,18 +268,18 @@ impl Extraction {
         }
     }
 
-    /// The finest cells for what is searched.
-    fn finest(&self, view: &View<'_>) -> CellGrid {
+    /// Cells of at least this size for what is searched.
+    fn cells_of(&self, view: &View<'_>, cell_log2: u8) -> CellGrid {
         let Some(number) = self.quarter.checked_sub(1) else { return view.grid };
-        let CellGrid { columns, rows, cell_log2, .. } = view.grid;
-        let half = |cells: usize| ((cells << cell_log2) / 2) as u16;
+        let CellGrid { columns, rows, .. } = view.grid;
+        let half = |cells: usize| ((cells << view.grid.cell_log2) / 2) as u16;
         let (width_px, height_px) = (half(columns), half(rows));
         let (column, row) = (number % QUARTERS_A_SIDE, number / QUARTERS_A_SIDE);
         let geometry = Geometry { width_px, height_px };
         CellGrid {
             x0: width_px / 2 * column as u16,
             y0: height_px / 2 * row as u16,
-            ..CellGrid::fit(geometry, self.least_log2, view.weights.len().min(VISIT_CELLS))
+            ..CellGrid::fit(geometry, cell_log2, view.weights.len().min(VISIT_CELLS))
         }
     }
 
@@ -326,7 +343,7 @@ impl Extraction {
     /// One step of the look for the rotation of all that moves.
     fn slow(&mut self, view: &View<'_>, scratch: &mut Scratch) {
         if scratch.explainer.step() {
-            if let Some(found) = believe(&scratch.explainer, self.line.hz, self.local)
+            if let Some(found) = believe(&scratch.explainer, self.line.hz)
                 && within(self.grid, found.disc)
             {
                 self.enter(found);
@@ -386,21 +403,27 @@ impl Extraction {
     }
 
     /// One step of the look for one rotation; k = 1 when it explains the whole map.
-    fn whole(&mut self, scratch: &mut Scratch) {
+    fn whole(&mut self, view: &View<'_>, scratch: &mut Scratch) {
         if !scratch.explainer.step() {
             return;
         }
-        let (region, _, _, winding) = scratch.explainer.result();
+        let (region, _, disc, winding) = scratch.explainer.result();
         let empty = region.len() < LEAST_PHASORS;
+        let few = region.len() < FEW_PHASORS && scratch.explainer.cell_px().is_some();
         if self.quarter == 0 && winding.windings == 0 && winding.share > SHARE_OF_ONE && !empty {
             self.in_step_hz = self.in_step_hz.or(Some(self.line.hz));
         }
-        self.whole = believe(&scratch.explainer, self.line.hz, self.local);
+        self.whole = believe(&scratch.explainer, self.line.hz);
         if let Some(whole) = self.whole
             && (whole.share >= SHARE_OF_ONE || self.quarter > 0)
         {
             self.take(whole);
             self.stage = Stage::Visits;
+            return;
+        }
+        if self.quarter > 0 && few {
+            let (total, events) = phasors(&view.window, disc, self.line.hz);
+            scratch.explainer.start_events(events, total, disc);
             return;
         }
         if self.quarter > 0 {
@@ -469,7 +492,7 @@ impl Extraction {
     /// One step of the look for the rotation of one cluster.
     fn part(&mut self, view: &View<'_>, scratch: &mut Scratch) {
         if scratch.explainer.step() {
-            if let Some(one) = believe(&scratch.explainer, self.line.hz, self.local) {
+            if let Some(one) = believe(&scratch.explainer, self.line.hz) {
                 self.parts.push(one).ok();
             }
             self.part += 1;
@@ -498,6 +521,22 @@ impl Extraction {
             *least = candidate;
         }
     }
+}
+
+/// The events of a disc as phasors at a frequency, evenly thinned, and their number.
+fn phasors(window: &Window<'_>, disc: Disc, line_hz: f32) -> (usize, impl Iterator<Item = Phasor>) {
+    let rate = TurnRate::from_rad_s(line_hz * TAU);
+    let (start_us, mid_us) = (window.start_us, (window.duration_us / 2) as i32);
+    let inside_disc = move |event: StoredEvent| {
+        let at = Phasor { x_px: event.x().into(), y_px: event.y().into(), ..Phasor::default() };
+        inside(&at, &disc).then_some(at)
+    };
+    let (total, events) = window.even(WINDING_PHASORS, inside_disc);
+    let events = events.map(move |(event, at)| {
+        let (sin, cos) = rate.after(event.since(start_us) - mid_us).sin_cos();
+        Phasor { re: cos, im: -sin, amplitude: 1.0, on: event.is_on(), ..at }
+    });
+    (total, events)
 }
 
 /// Side of the cells in which a disc is looked at: as small as the events let a cell and polarity have a phase, and no larger
