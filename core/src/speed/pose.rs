@@ -21,7 +21,7 @@ use super::path::{Knot, Moving, Path};
 use super::statistics::student_over_normal;
 use super::trend::{Point, Trend};
 use crate::limits::MAX_KNOTS;
-use crate::math::{TAU, Turn, TurnRate, quick_sqrt, sqrt};
+use crate::math::{TAU, Turn, TurnRate, larger, quick_sqrt, sqrt};
 use crate::rotors::Disc;
 use crate::store::Window;
 use blocks::{
@@ -79,6 +79,14 @@ impl Sums {
         low: Template::EMPTY,
         high: Template::EMPTY,
     };
+
+    /// Share of the events in step with the template of the round before.
+    fn in_step(&self) -> f32 {
+        let (in_step, count) = self.blocks.iter().fold((0.0, 0.0), |(in_step, count), block| {
+            (in_step + block.share() * block.count(), count + block.count())
+        });
+        in_step / larger(count, 1.0)
+    }
 }
 
 /// What is found of the pose.
@@ -201,6 +209,12 @@ impl Pose {
         self.harmonic > self.first_harmonic
     }
 
+    /// Blocks in a symmetry period, 0 when blocks are whole periods.
+    #[must_use]
+    pub const fn in_period(&self) -> usize {
+        self.in_period
+    }
+
     /// Rotor's events in the window.
     #[must_use]
     pub const fn events(&self) -> usize {
@@ -256,8 +270,12 @@ impl Pose {
     fn end_round(&mut self, sums: &mut Sums) -> bool {
         let fine = self.schedule.is_fine();
         let at_low = sums.low.coherence(&sums.counts);
-        let astray = at_low < SHARP_COHERENCE * self.first_coherence;
-        if fine && astray && self.harmonic > self.first_harmonic {
+        let blurred = at_low < SHARP_COHERENCE * self.first_coherence;
+        // Too few events for so high a harmonic: path and template chase each other.
+        let apart = self.schedule.phase() >= Phase::All
+            && self.phases.is_some()
+            && sums.in_step() < SHARP_COHERENCE * at_low;
+        if fine && (blurred || apart) && self.harmonic > self.first_harmonic {
             self.step_back();
             return false;
         }

@@ -22,9 +22,9 @@ const BLUR_OF_JITTER: f32 = 1.9;
 /// Farthest deviation of the fractional-baseline test where the harmonic is in doubt, as a share of the angle of symmetry; or
 /// half of what a speed by one winding more would show, where that is more: this fraction of the difference of the two angles.
 const MOST_DEVIATION: f32 = 0.03;
-/// The same where no other harmonic keeps step: half of what a pattern shows that does not turn at all. Jitter of a tenth of a
+/// The same where no other harmonic keeps step: a third of what a pattern shows that does not turn at all. Jitter of a tenth of a
 /// fast rotor's period makes its registrations scatter by as much as the next winding would.
-const MOST_CLEAR_DEVIATION: f32 = 0.5 * FRACTION;
+const MOST_CLEAR_DEVIATION: f32 = 0.35 * FRACTION;
 /// Witnesses of the lock may differ by this much, or by eight standard errors.
 const LOCK_AGREEMENT: f32 = 2e-3;
 const LOCK_SIGMAS: f32 = 8.0;
@@ -41,8 +41,9 @@ const COARSE_SPREAD: f32 = 0.5;
 /// queue may stretch the window by, must fit into it.
 const MOST_ERROR: f32 = 0.01;
 const COARSE_SIGMAS: f32 = 3.0;
-/// What a hand shakes, in pixels.
+/// What a hand shakes, in pixels, and blocks of a turn from which on a single mark's axis is told from the mark.
 const SHAKE_PX: f32 = 3.0;
+const MARK_BLOCKS: usize = 4;
 /// What shadows, flicker and folded slices may bias a registration by, in radians: a fifth of a pixel half-way to the rim.
 const BIAS_RAD: f32 = 5e-3;
 /// Standard deviation of the error by a busy readout, as a share of how far its queue may stretch the window.
@@ -105,8 +106,10 @@ impl Measurement {
         } else {
             0.0
         };
-        if self.status == Status::Coarse {
-            self.widen_coarse(held_up / QUEUE_SIGMA);
+        match self.status {
+            Status::Coarse => self.widen_coarse(held_up / QUEUE_SIGMA),
+            Status::Locked if self.pose.in_period() < MARK_BLOCKS => self.widen_mark(),
+            _ => {}
         }
         let own = self.estimate.sigma_rad_s;
         let late = held_up * self.estimate.omega_rad_s;
@@ -160,16 +163,21 @@ impl Measurement {
         Estimate { sigma_rad_s: sqrt(own * own + bias * bias), ..lock }
     }
 
-    /// A coarse reading of a single mark is as good as its axis holds still: what the mark does and what the camera
-    /// does look alike. One that may be farther off than any reading may be is none; `stretch` is the share by which the window
-    /// may be stretched.
-    fn widen_coarse(&mut self, stretch: f32) {
-        let turn_rad = self.evidence.periods.unwrap_or(0.0) * TAU;
+    /// The reading of a single mark is as good as its axis holds still, where it is not followed around the turn: what the mark does
+    /// and what the camera does look alike.
+    fn widen_mark(&mut self) {
         if self.parts == Some(1) {
+            let turn_rad = self.evidence.periods.unwrap_or(0.0) * TAU;
             let shake = SHAKE_PX / (self.disc.radius_px * turn_rad) * self.omega_rad_s;
             let own = self.estimate.sigma_rad_s;
             self.estimate.sigma_rad_s = sqrt(own * own + shake * shake);
         }
+    }
+
+    /// A coarse reading that may be farther off than any reading may be is none; `stretch` is the share by which the window may be
+    /// stretched.
+    fn widen_coarse(&mut self, stretch: f32) {
+        self.widen_mark();
         let room = (MOST_ERROR - stretch) * self.omega_rad_s.abs();
         if COARSE_SIGMAS * self.estimate.sigma_rad_s > room {
             self.status = Status::Refused(Reason::Ambiguous);
