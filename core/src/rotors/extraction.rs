@@ -61,10 +61,13 @@ const LEAST_EVENTS: usize = 100;
 /// Quarters of the picture that are searched after the whole of it: half of its width and height, in steps of half of that.
 const QUARTERS_A_SIDE: usize = 3;
 const QUARTERS: usize = QUARTERS_A_SIDE * QUARTERS_A_SIDE;
-/// Lines that are looked into in the quarters, all together, and in how many quarters each: a shaken background shows its
-/// own in all of them.
-const QUARTER_LOOKS: usize = 8;
+/// Lines that are looked into in the quarters, all together, in one of them, and in how many quarters each: a shaken background
+/// shows its own in all of them.
+const QUARTER_LOOKS: usize = 12;
+const LOOKS_A_QUARTER: usize = 2;
 const QUARTERS_A_LINE: usize = 2;
+/// Factor by which a line is higher where something turns at nearly the frequency that a hand trembles at.
+const HIGHER: f32 = 1.25;
 /// Cells with a phase below which a disc in a quarter is also looked at event by event.
 const FEW_PHASORS: usize = 32;
 /// In a quarter a cell counts as much as it has events, up to so many: a rotor has more of them than noise, and what is as bright
@@ -112,8 +115,8 @@ pub struct Extraction {
     lines: Lines,
     /// The line at hand.
     line: Line,
-    /// Frequencies in Hz that were looked into since the last rotor was found.
-    tried: Vec<f32, MAX_LINES>,
+    /// Lines that were looked into since the last rotor was found.
+    tried: Vec<Line, MAX_LINES>,
     k: usize,
     /// Cluster at hand.
     part: usize,
@@ -137,8 +140,11 @@ pub struct Extraction {
     whole: Option<Found>,
     /// What rotations of their own explain of its parts.
     parts: Vec<Found, MAX_CLUSTERS>,
-    /// Lines looked into.
+    /// Frequencies in Hz that were in step all over.
+    all_over: Vec<f32, MAX_LINES>,
+    /// Lines looked into, and those in this quarter.
     looks: usize,
+    quarter_looks: usize,
     /// Where all that moves lies, once what turns slowly is looked for.
     swept: Option<Disc>,
     /// Rotors by every line: the same one may stand here twice.
@@ -293,6 +299,7 @@ impl Extraction {
             self.tried.clear();
         }
         self.quarter += 1;
+        self.quarter_looks = 0;
         self.grid = CellGrid::default();
         self.stage = Stage::Visits;
     }
@@ -356,17 +363,25 @@ impl Extraction {
     fn map(&mut self, view: &mut View<'_>, scratch: &mut Scratch) {
         let width_hz = SAME_LINE * 1e6 / view.window.duration_us.max(1) as f32;
         let Some(line) = self.lines.pop() else { return self.next_quarter() };
-        let known = self.tried.iter().filter(|hz| (**hz - line.hz).abs() < width_hz).count();
+        let near = |tried: &&Line| (tried.hz - line.hz).abs() < width_hz;
+        let as_high = |tried: &&Line| self.quarter == 0 || line.sigmas < HIGHER * tried.sigmas;
+        let known = self.tried.iter().filter(near).filter(as_high).count();
         let (most, looks) =
             if self.quarter == 0 { (1, MAX_LINES) } else { (QUARTERS_A_LINE, QUARTER_LOOKS) };
-        if known >= most {
+        // What shakes or lights the whole picture does so in its quarters.
+        let all_over = |hz: &f32| self.quarter > 0 && (hz - line.hz).abs() < width_hz;
+        if known >= most || self.all_over.iter().any(all_over) {
             return;
         }
         if self.looks == looks {
             return self.end();
         }
+        if self.quarter > 0 && self.quarter_looks == LOOKS_A_QUARTER {
+            return self.next_quarter();
+        }
         self.looks += 1;
-        self.tried.push(line.hz).ok();
+        self.quarter_looks += 1;
+        self.tried.push(line).ok();
         self.line = line;
         let Some(weights) = view.weights.get_mut(..self.grid.len()) else { return self.end() };
         scratch.visits.map(line.hz, weights);
@@ -412,6 +427,7 @@ impl Extraction {
         let few = region.len() < FEW_PHASORS && scratch.explainer.cell_px().is_some();
         if self.quarter == 0 && winding.windings == 0 && winding.share > SHARE_OF_ONE && !empty {
             self.in_step_hz = self.in_step_hz.or(Some(self.line.hz));
+            self.all_over.push(self.line.hz).ok();
         }
         self.whole = believe(&scratch.explainer, self.line.hz);
         if let Some(whole) = self.whole

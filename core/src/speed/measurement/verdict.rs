@@ -140,7 +140,7 @@ impl Measurement {
         if self.in_doubt() {
             return false;
         }
-        self.pose.blur_px() < self.blur_px(MOST_BLUR)
+        self.edges_px() < self.blur_px(MOST_BLUR)
     }
 
     /// Whether the edges are so sharp that a registration that went astray does not count against them. Noise, which leads it
