@@ -146,8 +146,13 @@ impl Measurement {
     /// Whether the edges are so sharp that a registration that went astray does not count against them. Noise, which leads it
     /// astray, is no blur where no other harmonic keeps step.
     pub(super) fn sharp(&self) -> bool {
-        let blur_px = if self.doubted() { self.pose.sharpness_px() } else { self.pose.blur_px() };
+        let blur_px = if self.doubted() { self.pose.sharpness_px() } else { self.edges_px() };
         blur_px < self.blur_px(LEAST_BLUR)
+    }
+
+    /// How sharp the edges are. A single mark is told from its axis's shaking by its sharpness alone, so noise counts against it.
+    fn edges_px(&self) -> f32 {
+        if self.parts == Some(1) { self.pose.sharpness_px() } else { self.pose.blur_px() }
     }
 
     fn blur_px(&self, (share, px): (f32, f32)) -> f32 {
