@@ -7,11 +7,13 @@
 //! its memory is a reservoir thinned evenly (what a long baseline needs): every 2^s-th event, s growing as
 //! the reservoir fills. What is kept depends on the events and the capacity alone, never on when a task ran.
 
+mod even;
 mod event;
 mod lengthen;
 mod open;
 mod window;
 
+pub use even::Even;
 pub use event::StoredEvent;
 pub use window::{Account, Window};
 

@@ -158,6 +158,7 @@ impl<'m> Tachometer<'m> {
     #[must_use]
     pub const fn stage(&self) -> &'static str {
         match &self.job {
+            Job::Idle if self.window_segments > 0 => "conclusion",
             Job::Idle => "idle",
             Job::Search(extraction) => extraction.stage(),
             Job::Measure(_, measurement) => measurement.stage(),

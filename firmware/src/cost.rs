@@ -33,23 +33,23 @@ pub struct Spent {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct StageCost {
     /// Pieces of the measurement.
-    pub polls: u64,
+    pub polls: u32,
+    /// Ticks in the longest.
+    pub longest: u32,
     /// Ticks in all of them.
     pub ticks: u64,
-    /// Ticks in the longest.
-    pub longest: u64,
 }
 
 impl StageCost {
     fn add(&mut self, ticks: u64) {
-        self.polls += 1;
+        self.polls = self.polls.saturating_add(1);
         self.ticks += ticks;
-        self.longest = self.longest.max(ticks);
+        self.longest = self.longest.max(u32::try_from(ticks).unwrap_or(u32::MAX));
     }
 }
 
 /// Stages told apart.
-const STAGES: usize = 16;
+const STAGES: usize = 20;
 
 /// Costs counted around the calls into the tachometer.
 #[derive(Debug)]

@@ -7,7 +7,7 @@ use std::env;
 use std::path::{Path, PathBuf};
 
 use evtach_core::{Event, Geometry, Reading, Speed};
-use evtach_host::device::{self, Pace};
+use evtach_host::device::{self, CallCost, INSTRUCTIONS_PER_TICK, MOST_IN_STEP, Pace};
 use evtach_host::recording::{self, OpenOptions};
 use evtach_host::synth::scene::Lamp;
 use evtach_host::synth::{self, Rotor, Scene};
@@ -19,6 +19,10 @@ fn compare(name: &str, geometry: Geometry, events: &[Event]) -> Option<Vec<Readi
     }
     let image = device::build().expect("the firmware builds");
     let output = device::run(&image, geometry, events, Pace::File).expect("the firmware runs");
+    for CallCost { name: stage, longest_ticks, .. } in &output.stages {
+        let instructions = longest_ticks * INSTRUCTIONS_PER_TICK;
+        assert!(instructions <= MOST_IN_STEP, "{name}: a step of {stage} took {instructions}");
+    }
     Some(compare::assert_equal(name, geometry, events, &output))
 }
 

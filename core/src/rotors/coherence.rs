@@ -7,7 +7,7 @@
 use super::heat::CellGrid;
 use crate::limits::COHERENCE_CELLS;
 use crate::math::{TAU, TurnRate, sqrt};
-use crate::store::{StoredEvent, Window};
+use crate::store::{Even, StoredEvent, Window};
 
 /// Power over chance (1 for unrelated events) below which a cell counts as out of step.
 const LEAST_POWER: f32 = 2.5;
@@ -44,17 +44,27 @@ impl Default for Coherence {
 }
 
 impl Coherence {
-    /// Fills the map for one frequency with the events on the grid. Cost: about 100 instructions an event.
-    pub fn fill(&mut self, window: &Window<'_>, grid: CellGrid, line_hz: f32) {
+    /// Starts over.
+    pub fn clear(&mut self) {
         self.sums = [[(0.0, 0.0); COHERENCE_CELLS]; 2];
         self.counts = [[0; COHERENCE_CELLS]; 2];
+    }
+
+    /// Fills the map for one frequency with the events on the grid, a segment a call; `true` once all are in it.
+    pub fn fill(
+        &mut self,
+        window: &Window<'_>,
+        grid: CellGrid,
+        line_hz: f32,
+        even: &mut Even,
+    ) -> bool {
         let mid_us = (window.duration_us / 2) as i32;
         let rate = TurnRate::from_rad_s(line_hz * TAU);
         let inside = |event: StoredEvent| {
             let index = grid.index(event.x(), event.y());
             (index < grid.len()).then_some(index)
         };
-        for (event, index) in window.even(usize::MAX, inside).1 {
+        even.step(window, usize::MAX, inside, |event, index| {
             let (sin, cos) = rate.after(event.since(window.start_us) - mid_us).sin_cos();
             let bank = usize::from(event.is_on());
             if let Some(sum) = self.sums[bank].get_mut(index) {
@@ -62,7 +72,7 @@ impl Coherence {
                 sum.1 -= sin;
                 self.counts[bank][index] = self.counts[bank][index].saturating_add(1);
             }
-        }
+        })
     }
 
     /// Phasors of all cells in step, row by row, OFF before ON.

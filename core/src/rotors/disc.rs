@@ -41,28 +41,39 @@ impl Disc {
     }
 }
 
-/// Turns cluster `index` into a disc: removes outliers beyond three median distances, then takes centroid and
-/// radius of what remains. `None` when nothing remains.
-#[must_use]
-pub fn without_outliers(cells: Cells<'_>, clusters: &[Cluster], index: usize) -> Option<Disc> {
-    let grid = cells.grid;
-    let members = || cells.iter().filter(move |(x, y, _)| nearest(clusters, *x, *y).0 == index);
-    let cluster = clusters.get(index)?;
-    let (mut x_px, mut y_px) = (cluster.x_px, cluster.y_px);
-    let mut limit2 = f32::MAX;
-    let mut classes = [0.0_f32; CLASSES];
-    for _ in 0..OUTLIER_PASSES {
+/// Turns a cluster into a disc, a pass a step: removes outliers beyond three median distances, then takes centroid and
+/// radius of what remains.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sifting {
+    index: usize,
+    passes: u8,
+    x_px: f32,
+    y_px: f32,
+}
+
+impl Sifting {
+    /// Starts with cluster `index`; `None` where there is none.
+    #[must_use]
+    pub fn new(clusters: &[Cluster], index: usize) -> Option<Self> {
+        let Cluster { x_px, y_px, .. } = *clusters.get(index)?;
+        Some(Self { index, passes: 0, x_px, y_px })
+    }
+
+    /// One pass over the cells; the disc at the last, or none where nothing remains.
+    pub fn step(&mut self, cells: Cells<'_>, clusters: &[Cluster]) -> Sifted {
+        let (grid, index, (at_x, at_y)) = (cells.grid, self.index, (self.x_px, self.y_px));
+        let members = || cells.iter().filter(move |(x, y, _)| nearest(clusters, *x, *y).0 == index);
         let distance = |x: f32, y: f32| {
-            let (dx, dy) = (x - x_px, y - y_px);
+            let (dx, dy) = (x - at_x, y - at_y);
             dx * dx + dy * dy
         };
-        classes = [0.0; CLASSES];
+        let mut classes = [0.0_f32; CLASSES];
         for (x, y, weight) in members() {
             let class = (sqrt(distance(x, y)) / grid.cell_px()) as usize;
             classes[class.min(CLASSES - 1)] += weight;
         }
         let limit = OUTLIER_MEDIANS * quantile(&classes, 0.5) * grid.cell_px();
-        limit2 = limit * limit;
+        let limit2 = limit * limit;
         let (mut sum_x, mut sum_y, mut mass) = (0.0, 0.0, 0.0);
         for (x, y, weight) in members().filter(|(x, y, _)| distance(*x, *y) <= limit2) {
             sum_x += x * weight;
@@ -70,14 +81,29 @@ pub fn without_outliers(cells: Cells<'_>, clusters: &[Cluster], index: usize) ->
             mass += weight;
         }
         if mass <= 0.0 {
-            return None;
+            return Sifted::Nothing;
         }
-        (x_px, y_px) = (sum_x / mass, sum_y / mass);
+        (self.x_px, self.y_px) = (sum_x / mass, sum_y / mass);
+        self.passes += 1;
+        if self.passes < OUTLIER_PASSES {
+            return Sifted::Running;
+        }
+        let limit = (sqrt(limit2) / grid.cell_px()) as usize;
+        classes[(limit + 1).min(CLASSES)..].fill(0.0);
+        let radius_px = quantile(&classes, RADIUS_QUANTILE) * grid.cell_px();
+        Sifted::Disc(Disc { x_px: self.x_px, y_px: self.y_px, radius_px })
     }
-    let limit = (sqrt(limit2) / grid.cell_px()) as usize;
-    classes[(limit + 1).min(CLASSES)..].fill(0.0);
-    let radius_px = quantile(&classes, RADIUS_QUANTILE) * grid.cell_px();
-    Some(Disc { x_px, y_px, radius_px })
+}
+
+/// What a step of a sifting left.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sifted {
+    /// More steps to come.
+    Running,
+    /// Nothing remains.
+    Nothing,
+    /// What remains.
+    Disc(Disc),
 }
 
 /// The quantile of a histogram of distance classes, in classes.
@@ -115,7 +141,15 @@ mod tests {
     fn one(weights: &[u8]) -> Disc {
         let cluster = Cluster { x_px: 150.0, y_px: 120.0, mass: 1.0 };
         let cells = Cells { grid: GRID, weights, floor: 0 };
-        without_outliers(cells, &[cluster], 0).unwrap_or_default()
+        let clusters = [cluster];
+        let mut sifting = Sifting::new(&clusters, 0).expect("a cluster");
+        loop {
+            match sifting.step(cells, &clusters) {
+                Sifted::Running => {}
+                Sifted::Nothing => return Disc::default(),
+                Sifted::Disc(disc) => return disc,
+            }
+        }
     }
 
     #[test]

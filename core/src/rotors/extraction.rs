@@ -17,12 +17,12 @@ use heapless::Vec;
 
 use super::belief::{LEAST_PHASORS, believe, inside};
 use super::coherence::{Coherence, Phasor};
-use super::disc::{Disc, without_outliers};
+use super::disc::{Disc, Sifted, Sifting};
 use super::heat::{CellGrid, Cells};
 use super::kmeans::{Cluster, KMeans, Seeding, davies_bouldin, nearest};
 use super::lines::{Line, Lines, Spectrum};
-use super::sweep::sweep;
-use super::visits::Visits;
+use super::sweep::Sweep;
+use super::visits::{Filling, Visits};
 use super::winding::Explainer;
 use crate::event::Geometry;
 use crate::limits::{
@@ -32,7 +32,7 @@ use crate::limits::{
 use crate::math::{TAU, TurnRate, sqrt};
 use crate::order::sort_few;
 use crate::speed::polar::{PolarTrack, track};
-use crate::store::{StoredEvent, Window};
+use crate::store::{Even, StoredEvent, Window};
 
 /// Half the side of a local map in radii of its disc.
 const LOCAL_SHARE: f32 = 1.25;
@@ -96,13 +96,45 @@ enum Stage {
     #[default]
     Visits,
     Lags,
+    Spectrum,
+    Line,
     Map,
+    Judge,
+    Seed,
+    Around,
+    Size,
+    Fill,
+    Collect,
+    Events,
     Whole,
     Split,
+    Apart,
     Part,
+    Moving,
+    Heat,
+    Track,
     Sweep,
     Slow,
     Done,
+}
+
+/// Whose rotation is looked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum For {
+    #[default]
+    Whole,
+    Part,
+    Slow,
+}
+
+/// How far a clustering has got.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Clustering {
+    #[default]
+    First,
+    Seeds,
+    Sweeps,
+    Index,
 }
 
 /// An extraction in progress.
@@ -117,9 +149,24 @@ pub struct Extraction {
     line: Line,
     /// Lines that were looked into since the last rotor was found.
     tried: Vec<Line, MAX_LINES>,
+    /// Clusters of the clustering at hand, how they are seeded, and how far it has got.
     k: usize,
+    seeding: Seeding,
+    kmeans: KMeans,
+    clustering: Clustering,
     /// Cluster at hand.
     part: usize,
+    sifting: Sifting,
+    /// The collection of visits, once it has begun.
+    filling: Option<Filling>,
+    /// Neighbours to each side that a cell of the map is judged with.
+    reach: usize,
+    /// The disc that is looked at and why, its events, and how far it has got.
+    disc: Disc,
+    looked_for: For,
+    events: usize,
+    even: Even,
+    sweeping: Sweep,
     /// Clustering with the lowest index so far.
     best_index: f32,
     best: Vec<Cluster, MAX_CLUSTERS>,
@@ -185,13 +232,26 @@ impl Extraction {
     ) -> bool {
         match self.stage {
             Stage::Visits => self.visits(view, spectrum, scratch),
-            Stage::Lags => self.lags(view, spectrum, scratch),
+            Stage::Lags => self.lags(spectrum, scratch),
+            Stage::Spectrum => self.spectrum(view, spectrum, scratch),
+            Stage::Line => self.line(view, scratch),
             Stage::Map => self.map(view, scratch),
-            Stage::Whole => self.whole(view, scratch),
-            Stage::Split => self.split(view, scratch),
-            Stage::Part => self.part(view, scratch),
-            Stage::Sweep => self.sweep(view, track, scratch),
-            Stage::Slow => self.slow(view, scratch),
+            Stage::Judge => self.judge(view, scratch),
+            Stage::Seed => self.seed(view),
+            Stage::Around => self.around(view),
+            Stage::Size => self.size(view, scratch),
+            Stage::Fill => self.fill(view, scratch),
+            Stage::Collect => self.collect(scratch),
+            Stage::Events => self.events(view, scratch),
+            Stage::Whole => self.whole(scratch),
+            Stage::Split => self.split(view),
+            Stage::Apart => self.apart(view),
+            Stage::Part => self.part(scratch),
+            Stage::Moving => self.moving(view, scratch),
+            Stage::Heat => self.heat(view, scratch),
+            Stage::Track => self.track(view, track),
+            Stage::Sweep => self.sweep(view, track),
+            Stage::Slow => self.slow(scratch),
             Stage::Done => {}
         }
         self.stage == Stage::Done
@@ -202,11 +262,12 @@ impl Extraction {
     pub const fn stage(&self) -> &'static str {
         match self.stage {
             Stage::Visits => "visits",
-            Stage::Lags => "spectrum",
-            Stage::Map => "map",
-            Stage::Whole | Stage::Part | Stage::Slow => "winding",
-            Stage::Sweep => "sweep",
-            Stage::Split => "split",
+            Stage::Lags | Stage::Spectrum => "spectrum",
+            Stage::Line | Stage::Map | Stage::Judge | Stage::Seed | Stage::Around => "map",
+            Stage::Size | Stage::Fill | Stage::Collect => "coherence",
+            Stage::Events | Stage::Whole | Stage::Part | Stage::Slow => "winding",
+            Stage::Moving | Stage::Heat | Stage::Track | Stage::Sweep => "sweep",
+            Stage::Split | Stage::Apart => "split",
             Stage::Done => "done",
         }
     }
@@ -226,14 +287,19 @@ impl Extraction {
 
     /// Collects what is outside the rotors found so far.
     fn visits(&mut self, view: &View<'_>, spectrum: &mut Spectrum, scratch: &mut Scratch) {
-        if self.taken.is_full() {
-            return self.end();
-        }
-        if self.grid.is_empty() {
-            self.grid = self.cells_of(view, self.least_log2);
-            self.finer = false;
-        }
-        let (events, company) = scratch.visits.fill(&view.window, self.grid, &self.taken);
+        let Some(filling) = &mut self.filling else {
+            if self.taken.is_full() {
+                return self.end();
+            }
+            if self.grid.is_empty() {
+                self.grid = self.cells_of(view, self.least_log2);
+                self.finer = false;
+            }
+            return self.start_filling(scratch);
+        };
+        let filled = scratch.visits.fill(&view.window, &self.taken, filling);
+        let Some((events, company)) = filled else { return };
+        self.filling = None;
         if events < LEAST_EVENTS {
             return if self.quarter == 0 { self.end() } else { self.next_quarter() };
         }
@@ -259,19 +325,28 @@ impl Extraction {
         self.stage = Stage::Lags;
     }
 
-    fn lags(&mut self, view: &View<'_>, spectrum: &mut Spectrum, scratch: &mut Scratch) {
+    fn start_filling(&mut self, scratch: &mut Scratch) {
+        scratch.visits.clear(self.grid);
+        self.filling = Some(Filling::default());
+    }
+
+    fn lags(&mut self, spectrum: &mut Spectrum, scratch: &mut Scratch) {
         let most_weight = if self.quarter == 0 { 1 } else { MOST_WEIGHT };
         if scratch.visits.step(spectrum.lags(), most_weight) {
-            self.lines = spectrum.lines(scratch.visits.chance(), view.window.duration_us);
-            let too_fine = self.lonely || self.finer && self.grid.cell_log2 < self.least_log2;
-            if self.lines.is_empty() && too_fine {
-                self.grid = self.grid.coarser();
-                self.stage = Stage::Visits;
-                return;
-            }
-            self.lines.reverse();
-            self.stage = Stage::Map;
+            self.stage = Stage::Spectrum;
         }
+    }
+
+    fn spectrum(&mut self, view: &View<'_>, spectrum: &mut Spectrum, scratch: &Scratch) {
+        self.lines = spectrum.lines(scratch.visits.chance(), view.window.duration_us);
+        let too_fine = self.lonely || self.finer && self.grid.cell_log2 < self.least_log2;
+        if self.lines.is_empty() && too_fine {
+            self.grid = self.grid.coarser();
+            self.stage = Stage::Visits;
+            return;
+        }
+        self.lines.reverse();
+        self.stage = Stage::Line;
     }
 
     /// Cells of at least this size for what is searched.
@@ -305,8 +380,9 @@ impl Extraction {
     }
 
     fn end(&mut self) {
-        if self.candidates.is_empty() && self.stage != Stage::Slow && self.swept.is_none() {
-            self.stage = Stage::Sweep;
+        if self.candidates.is_empty() && self.swept.is_none() {
+            self.grid = CellGrid::default();
+            self.stage = Stage::Moving;
             return;
         }
         // A piece of a rotor, or a rotor by the line of its neighbour, explains fewer events than the rotor by
@@ -315,52 +391,75 @@ impl Extraction {
         self.stage = Stage::Done;
     }
 
-    /// Where nothing passes anywhere twice: looks for what turns slowly in the middle of all that moves.
-    fn sweep(&mut self, view: &mut View<'_>, polar: &mut PolarTrack, scratch: &mut Scratch) {
-        self.grid = view.grid;
-        while scratch.visits.fill(&view.window, self.grid, &[]).1 < LEAST_COMPANY
-            && self.grid.cell_log2 < COARSEST_LOG2
-        {
+    /// Where nothing passes anywhere twice, what turns slowly is looked for in the middle of all that moves.
+    fn moving(&mut self, view: &View<'_>, scratch: &mut Scratch) {
+        let Some(filling) = &mut self.filling else {
+            if self.grid.is_empty() {
+                self.grid = view.grid;
+            }
+            return self.start_filling(scratch);
+        };
+        let filled = scratch.visits.fill(&view.window, &[], filling);
+        let Some((_, company)) = filled else { return };
+        self.filling = None;
+        if company < LEAST_COMPANY && self.grid.cell_log2 < COARSEST_LOG2 {
             self.grid = self.grid.coarser();
+            return;
         }
-        let Some(weights) = view.weights.get_mut(..self.grid.len()) else { return self.end() };
-        scratch.visits.heat(weights);
-        let cells = self.cells(view);
-        let mut one = KMeans::seed(cells, 1, Seeding::FarthestMean);
-        one.sweep(cells);
-        let all = without_outliers(cells, one.clusters(), 0).unwrap_or_default();
-        self.swept = Some(all);
-        // Seen from beside its centre: about the centre of n blades all harmonics but n and its multiples are silent.
-        let beside = Disc { x_px: all.x_px + BESIDE * all.radius_px, ..all };
-        track(&view.window, beside, polar);
-        self.lines.clear();
-        for hz in sweep(polar, view.window.duration_us).into_iter().rev() {
-            self.lines.push(Line { hz, sigmas: 0.0 }).ok();
-        }
-        self.next_slow(view, scratch);
+        self.stage = Stage::Heat;
     }
 
-    fn next_slow(&mut self, view: &View<'_>, scratch: &mut Scratch) {
-        self.stage = Stage::Slow;
+    fn heat(&mut self, view: &mut View<'_>, scratch: &Scratch) {
+        scratch.visits.heat(view.weights.get_mut(..self.grid.len()).unwrap_or_default());
+        self.looked_for = For::Slow;
+        self.stage = Stage::Seed;
+    }
+
+    fn start_track(&mut self, all: Disc) {
+        self.swept = Some(all);
+        // Seen from beside its centre: about the centre of n blades all harmonics but n and its multiples are silent.
+        self.disc = Disc { x_px: all.x_px + BESIDE * all.radius_px, ..all };
+        self.even = Even::default();
+        self.stage = Stage::Track;
+    }
+
+    fn track(&mut self, view: &View<'_>, polar: &mut PolarTrack) {
+        if track(&view.window, self.disc, polar, &mut self.even) {
+            self.sweeping = Sweep::default();
+            self.stage = Stage::Sweep;
+        }
+    }
+
+    fn sweep(&mut self, view: &View<'_>, polar: &PolarTrack) {
+        if self.sweeping.step(polar, view.window.duration_us) {
+            self.lines.clear();
+            for hz in core::mem::take(&mut self.sweeping).hz().into_iter().rev() {
+                self.lines.push(Line { hz, sigmas: 0.0 }).ok();
+            }
+            self.next_slow();
+        }
+    }
+
+    fn next_slow(&mut self) {
         let (Some(line), Some(disc)) = (self.lines.pop(), self.swept) else { return self.end() };
         self.line = line;
-        self.look(view, disc, |_| true, scratch);
+        self.look(For::Slow, disc);
     }
 
     /// One step of the look for the rotation of all that moves.
-    fn slow(&mut self, view: &View<'_>, scratch: &mut Scratch) {
+    fn slow(&mut self, scratch: &mut Scratch) {
         if scratch.explainer.step() {
             if let Some(found) = believe(&scratch.explainer, self.line.hz)
                 && within(self.grid, found.disc)
             {
                 self.enter(found);
             }
-            self.next_slow(view, scratch);
+            self.next_slow();
         }
     }
 
-    /// Fills the map of the next line and asks whether one rotation explains it all.
-    fn map(&mut self, view: &mut View<'_>, scratch: &mut Scratch) {
+    /// Takes the next line up.
+    fn line(&mut self, view: &View<'_>, scratch: &mut Scratch) {
         let width_hz = SAME_LINE * 1e6 / view.window.duration_us.max(1) as f32;
         let Some(line) = self.lines.pop() else { return self.next_quarter() };
         let near = |tried: &&Line| (tried.hz - line.hz).abs() < width_hz;
@@ -383,14 +482,61 @@ impl Extraction {
         self.quarter_looks += 1;
         self.tried.push(line).ok();
         self.line = line;
+        self.reach = 1;
+        scratch.visits.start_map();
+        self.stage = Stage::Map;
+    }
+
+    /// Fills the map of the line at hand.
+    fn map(&mut self, view: &mut View<'_>, scratch: &mut Scratch) {
         let Some(weights) = view.weights.get_mut(..self.grid.len()) else { return self.end() };
-        scratch.visits.map(line.hz, weights);
+        if scratch.visits.map(self.line.hz, weights) {
+            self.stage = Stage::Judge;
+        }
+    }
+
+    fn judge(&mut self, view: &mut View<'_>, scratch: &mut Scratch) {
+        let weights = view.weights.get_mut(..self.grid.len()).unwrap_or_default();
+        if !scratch.visits.judge(weights, self.reach) {
+            self.reach += 1;
+            scratch.visits.start_map();
+            self.stage = Stage::Map;
+            return;
+        }
+        self.looked_for = For::Whole;
+        self.stage = Stage::Seed;
+    }
+
+    /// Takes the map for one cluster.
+    fn seed(&mut self, view: &View<'_>) {
         let cells = self.cells(view);
-        let mut one = KMeans::seed(cells, 1, Seeding::FarthestMean);
-        one.sweep(cells);
-        if let Some(all) = without_outliers(cells, one.clusters(), 0) {
-            self.look(view, all, |_| true, scratch);
-            self.stage = Stage::Whole;
+        self.kmeans = KMeans::seed(cells);
+        self.kmeans.sweep(cells);
+        match Sifting::new(self.kmeans.clusters(), 0) {
+            Some(sifting) => {
+                self.sifting = sifting;
+                self.stage = Stage::Around;
+            }
+            None => self.gathered(None),
+        }
+    }
+
+    /// Looks where it lies.
+    fn around(&mut self, view: &View<'_>) {
+        match self.sifting.step(self.cells(view), self.kmeans.clusters()) {
+            Sifted::Running => {}
+            Sifted::Nothing => self.gathered(None),
+            Sifted::Disc(all) => self.gathered(Some(all)),
+        }
+    }
+
+    /// Goes on with the disc that holds all of the map.
+    fn gathered(&mut self, all: Option<Disc>) {
+        match (self.looked_for, all) {
+            (For::Slow, all) => self.start_track(all.unwrap_or_default()),
+            // Does one rotation explain it?
+            (_, Some(all)) => self.look(For::Whole, all),
+            (_, None) => self.stage = Stage::Line,
         }
     }
 
@@ -401,28 +547,83 @@ impl Extraction {
     }
 
     /// Starts to look for the rotation that explains a disc.
-    fn look(
-        &mut self,
-        view: &View<'_>,
-        disc: Disc,
-        mine: impl Fn(&Phasor) -> bool,
-        scratch: &mut Scratch,
-    ) {
+    fn look(&mut self, looked_for: For, disc: Disc) {
+        self.looked_for = looked_for;
+        self.disc = disc;
+        self.events = 0;
+        self.even = Even::default();
+        self.stage = Stage::Size;
+    }
+
+    /// Side of the cells in which the disc is looked at: as small as the events let a cell and polarity have a phase, and no
+    /// larger than what blades can be told apart with.
+    fn size(&mut self, view: &View<'_>, scratch: &mut Scratch) {
+        let disc = self.disc;
+        let inside = |event: StoredEvent| {
+            let at = Disc { x_px: event.x().into(), y_px: event.y().into(), radius_px: 0.0 };
+            (disc.distance2(&at) < disc.radius_px * disc.radius_px).then_some(())
+        };
+        if !self.even.step(&view.window, usize::MAX, inside, |_, ()| self.events += 1) {
+            return;
+        }
+        let share = sqrt(TAU * EVENTS_A_PHASE / self.events.max(1) as f32);
+        let cell_px = disc.radius_px * share.min(MOST_CELL_SHARE);
         let half_px = LOCAL_SHARE * disc.radius_px + self.grid.cell_px();
-        let cell_px = local_cell_px(&view.window, disc);
         self.local = CellGrid::around(disc.x_px, disc.y_px, half_px, cell_px, COHERENCE_CELLS);
-        scratch.coherence.fill(&view.window, self.local, self.line.hz);
-        let phasors = scratch.coherence.phasors(self.local);
-        let cell_px = self.local.cell_px();
-        scratch.explainer.start(phasors, |p| inside(p, &disc) && mine(p), disc, cell_px);
+        scratch.coherence.clear();
+        self.even = Even::default();
+        self.stage = Stage::Fill;
+    }
+
+    fn fill(&mut self, view: &View<'_>, scratch: &mut Scratch) {
+        if scratch.coherence.fill(&view.window, self.local, self.line.hz, &mut self.even) {
+            self.stage = Stage::Collect;
+        }
+    }
+
+    fn collect(&mut self, scratch: &mut Scratch) {
+        let disc = self.disc;
+        let mine = |p: &Phasor| {
+            inside(p, &disc)
+                && (self.looked_for != For::Part
+                    || nearest(&self.best, p.x_px, p.y_px).0 == self.part)
+        };
+        let Scratch { coherence, explainer, .. } = scratch;
+        explainer.start(coherence.phasors(self.local), mine, disc, self.local.cell_px());
+        self.stage = match self.looked_for {
+            For::Whole => Stage::Whole,
+            For::Part => Stage::Part,
+            For::Slow => Stage::Slow,
+        };
+    }
+
+    /// Takes the events of the disc for phasors, one by one.
+    fn events(&mut self, view: &View<'_>, scratch: &mut Scratch) {
+        let window = &view.window;
+        let mid_us = (window.duration_us / 2) as i32;
+        let rate = TurnRate::from_rad_s(self.line.hz * TAU);
+        let disc = self.disc;
+        let inside = |event: StoredEvent| {
+            let at = Phasor { x_px: event.x().into(), y_px: event.y().into(), ..Phasor::default() };
+            inside(&at, &disc).then_some(at)
+        };
+        let explainer = &mut scratch.explainer;
+        let all = self.even.step(window, WINDING_PHASORS, inside, |event, at| {
+            let (sin, cos) = rate.after(event.since(window.start_us) - mid_us).sin_cos();
+            explainer.add(Phasor { re: cos, im: -sin, amplitude: 1.0, on: event.is_on(), ..at });
+        });
+        if all {
+            explainer.collected(self.even.count());
+            self.stage = Stage::Whole;
+        }
     }
 
     /// One step of the look for one rotation; k = 1 when it explains the whole map.
-    fn whole(&mut self, view: &View<'_>, scratch: &mut Scratch) {
+    fn whole(&mut self, scratch: &mut Scratch) {
         if !scratch.explainer.step() {
             return;
         }
-        let (region, _, disc, winding) = scratch.explainer.result();
+        let (region, _, _, winding) = scratch.explainer.result();
         let empty = region.len() < LEAST_PHASORS;
         let few = region.len() < FEW_PHASORS && scratch.explainer.cell_px().is_some();
         if self.quarter == 0 && winding.windings == 0 && winding.share > SHARE_OF_ONE && !empty {
@@ -438,13 +639,14 @@ impl Extraction {
             return;
         }
         if self.quarter > 0 && few {
-            let (total, events) = phasors(&view.window, disc, self.line.hz);
-            scratch.explainer.start_events(events, total, disc);
+            scratch.explainer.start_events(self.disc);
+            self.even = Even::default();
+            self.stage = Stage::Events;
             return;
         }
         if self.quarter > 0 {
             // Two in a quarter were told apart in the whole, or are in quarters of their own.
-            self.stage = Stage::Map;
+            self.stage = Stage::Line;
             return;
         }
         self.k = 2;
@@ -454,40 +656,73 @@ impl Extraction {
     }
 
     /// Splits the map into k clusters and keeps the clustering of the best index.
-    fn split(&mut self, view: &View<'_>, scratch: &mut Scratch) {
+    fn split(&mut self, view: &View<'_>) {
         let cells = self.cells(view);
-        for seeding in [Seeding::FarthestMean, Seeding::FarthestNearest] {
-            let mut kmeans = KMeans::seed(cells, self.k, seeding);
-            while !kmeans.sweep(cells) {}
-            let index = davies_bouldin(cells, kmeans.clusters());
-            if let Some(index) = index.filter(|index| *index < self.best_index) {
-                self.best_index = index;
-                self.best.clear();
-                self.best.extend_from_slice(kmeans.clusters()).ok();
+        match self.clustering {
+            Clustering::First => {
+                self.kmeans = KMeans::seed(cells);
+                self.clustering = Clustering::Seeds;
+            }
+            Clustering::Seeds => {
+                if !self.kmeans.grow(cells, self.k, self.seeding) {
+                    self.clustering = Clustering::Sweeps;
+                }
+            }
+            Clustering::Sweeps => {
+                if self.kmeans.sweep(cells) {
+                    self.clustering = Clustering::Index;
+                }
+            }
+            Clustering::Index => {
+                let index = davies_bouldin(cells, self.kmeans.clusters());
+                if let Some(index) = index.filter(|index| *index < self.best_index) {
+                    self.best_index = index;
+                    self.best.clear();
+                    self.best.extend_from_slice(self.kmeans.clusters()).ok();
+                }
+                self.next_split();
             }
         }
+    }
+
+    /// Goes on with the next seeding, or one cluster more, or the best of all clusterings.
+    fn next_split(&mut self) {
+        self.clustering = Clustering::First;
+        if self.seeding == Seeding::FarthestMean {
+            self.seeding = Seeding::FarthestNearest;
+            return;
+        }
+        self.seeding = Seeding::FarthestMean;
         self.k += 1;
         if self.k > MAX_CLUSTERS {
             self.part = 0;
             self.parts.clear();
-            self.stage = Stage::Part;
-            self.start_part(view, scratch);
+            self.start_part();
         }
     }
 
     /// Starts to look for the rotation that explains the next cluster.
-    fn start_part(&mut self, view: &View<'_>, scratch: &mut Scratch) {
-        while self.part < self.best.len() {
-            if let Some(part) = without_outliers(self.cells(view), &self.best, self.part) {
-                let best = self.best.clone();
-                let number = self.part;
-                let mine = |p: &Phasor| nearest(&best, p.x_px, p.y_px).0 == number;
-                self.look(view, part, mine, scratch);
-                return;
+    fn start_part(&mut self) {
+        match Sifting::new(&self.best, self.part) {
+            Some(sifting) => {
+                self.sifting = sifting;
+                self.stage = Stage::Apart;
             }
-            self.part += 1;
+            None => self.choose(),
         }
-        self.choose();
+    }
+
+    fn apart(&mut self, view: &View<'_>) {
+        match self.sifting.step(self.cells(view), &self.best) {
+            Sifted::Running => {}
+            Sifted::Nothing => self.next_part(),
+            Sifted::Disc(part) => self.look(For::Part, part),
+        }
+    }
+
+    fn next_part(&mut self) {
+        self.part += 1;
+        self.start_part();
     }
 
     /// Takes the whole map for one rotor or its parts for several, whichever explains more events.
@@ -497,7 +732,7 @@ impl Extraction {
         match self.whole {
             Some(whole) if whole.explained > apart => self.take(whole),
             None if parts.is_empty() => {
-                self.stage = Stage::Map;
+                self.stage = Stage::Line;
                 return;
             }
             _ => parts.into_iter().for_each(|part| self.take(part)),
@@ -506,13 +741,12 @@ impl Extraction {
     }
 
     /// One step of the look for the rotation of one cluster.
-    fn part(&mut self, view: &View<'_>, scratch: &mut Scratch) {
+    fn part(&mut self, scratch: &mut Scratch) {
         if scratch.explainer.step() {
             if let Some(one) = believe(&scratch.explainer, self.line.hz) {
                 self.parts.push(one).ok();
             }
-            self.part += 1;
-            self.start_part(view, scratch);
+            self.next_part();
         }
     }
 
@@ -537,34 +771,6 @@ impl Extraction {
             *least = candidate;
         }
     }
-}
-
-/// The events of a disc as phasors at a frequency, evenly thinned, and their number.
-fn phasors(window: &Window<'_>, disc: Disc, line_hz: f32) -> (usize, impl Iterator<Item = Phasor>) {
-    let rate = TurnRate::from_rad_s(line_hz * TAU);
-    let (start_us, mid_us) = (window.start_us, (window.duration_us / 2) as i32);
-    let inside_disc = move |event: StoredEvent| {
-        let at = Phasor { x_px: event.x().into(), y_px: event.y().into(), ..Phasor::default() };
-        inside(&at, &disc).then_some(at)
-    };
-    let (total, events) = window.even(WINDING_PHASORS, inside_disc);
-    let events = events.map(move |(event, at)| {
-        let (sin, cos) = rate.after(event.since(start_us) - mid_us).sin_cos();
-        Phasor { re: cos, im: -sin, amplitude: 1.0, on: event.is_on(), ..at }
-    });
-    (total, events)
-}
-
-/// Side of the cells in which a disc is looked at: as small as the events let a cell and polarity have a phase, and no larger
-/// than what blades can be told apart with.
-fn local_cell_px(window: &Window<'_>, disc: Disc) -> f32 {
-    let inside = |event: StoredEvent| {
-        let at = Disc { x_px: event.x().into(), y_px: event.y().into(), radius_px: 0.0 };
-        (disc.distance2(&at) < disc.radius_px * disc.radius_px).then_some(())
-    };
-    let events = window.even(usize::MAX, inside).1.count();
-    let share = sqrt(TAU * EVENTS_A_PHASE / events.max(1) as f32);
-    disc.radius_px * share.min(MOST_CELL_SHARE)
 }
 
 /// Whether a disc lies within the picture. What turns once and over all of the picture is the camera.

@@ -17,9 +17,10 @@ const MAX_SWEEPS: u8 = 12;
 const SETTLED_PX2: f32 = 0.05;
 
 /// How the seeds after the first are chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Seeding {
     /// Largest mean distance to the seeds so far: the paper's rule.
+    #[default]
     FarthestMean,
     /// Largest distance to the nearest seed so far: also right where the mean rule returns to the
     /// neighbourhood of a seed (rows of rotors, unequal speeds).
@@ -48,6 +49,8 @@ impl Cluster {
 #[derive(Debug, Default)]
 pub struct KMeans {
     clusters: Vec<Cluster, MAX_CLUSTERS>,
+    /// Weight that a cell must exceed to become a seed.
+    floor: f32,
     sweeps: u8,
 }
 
@@ -65,10 +68,9 @@ pub fn nearest(clusters: &[Cluster], x_px: f32, y_px: f32) -> (usize, f32) {
 }
 
 impl KMeans {
-    /// Chooses `k` seeds (1 to [`MAX_CLUSTERS`]): the highest cell, then the farthest with more than 0.3 of it.
+    /// Starts with the highest cell as the first seed; none where all are zero.
     #[must_use]
-    pub fn seed(cells: Cells<'_>, k: usize, seeding: Seeding) -> Self {
-        let mut clusters = Vec::<Cluster, MAX_CLUSTERS>::new();
+    pub fn seed(cells: Cells<'_>) -> Self {
         let mut highest = (0.0, 0.0, 0.0);
         for cell in cells.iter() {
             if cell.2 > highest.2 {
@@ -76,33 +78,40 @@ impl KMeans {
             }
         }
         let (x_px, y_px, top) = highest;
-        if top <= 0.0 {
-            return Self::default();
+        let mut clusters = Vec::new();
+        if top > 0.0 {
+            clusters.push(Cluster { x_px, y_px, mass: 0.0 }).ok();
         }
-        let floor = SEED_SHARE * top;
-        clusters.push(Cluster { x_px, y_px, mass: 0.0 }).ok();
-        while clusters.len() < k.min(MAX_CLUSTERS) {
-            let mut best = (0.0_f32, 0.0, 0.0);
-            for (x, y, weight) in cells.iter() {
-                if weight <= floor {
-                    continue;
-                }
-                let far = match seeding {
-                    Seeding::FarthestMean => {
-                        clusters.iter().map(|c| rough::sqrt(c.distance2(x, y))).sum()
-                    }
-                    Seeding::FarthestNearest => nearest(&clusters, x, y).1,
-                };
-                if far > best.0 {
-                    best = (far, x, y);
-                }
+        Self { clusters, floor: SEED_SHARE * top, sweeps: 0 }
+    }
+
+    /// Adds the farthest cell with more than 0.3 of the highest as a seed; `false` when there are `k` of at most
+    /// [`MAX_CLUSTERS`], or no more are to be had.
+    pub fn grow(&mut self, cells: Cells<'_>, k: usize, seeding: Seeding) -> bool {
+        let clusters = &mut self.clusters;
+        if clusters.is_empty() || clusters.len() >= k.min(MAX_CLUSTERS) {
+            return false;
+        }
+        let mut best = (0.0_f32, 0.0, 0.0);
+        for (x, y, weight) in cells.iter() {
+            if weight <= self.floor {
+                continue;
             }
-            if best.0 <= 0.0 {
-                break;
+            let far = match seeding {
+                Seeding::FarthestMean => {
+                    clusters.iter().map(|c| rough::sqrt(c.distance2(x, y))).sum()
+                }
+                Seeding::FarthestNearest => nearest(clusters, x, y).1,
+            };
+            if far > best.0 {
+                best = (far, x, y);
             }
+        }
+        let found = best.0 > 0.0;
+        if found {
             clusters.push(Cluster { x_px: best.1, y_px: best.2, mass: 0.0 }).ok();
         }
-        Self { clusters, sweeps: 0 }
+        found
     }
 
     /// One assignment and update of all centroids; `true` once they have settled.
@@ -192,7 +201,8 @@ mod tests {
     }
 
     fn cluster(weights: &[u8], k: usize, seeding: Seeding) -> KMeans {
-        let mut kmeans = KMeans::seed(cells(weights), k, seeding);
+        let mut kmeans = KMeans::seed(cells(weights));
+        while kmeans.grow(cells(weights), k, seeding) {}
         while !kmeans.sweep(cells(weights)) {}
         kmeans
     }
@@ -226,6 +236,8 @@ mod tests {
     #[test]
     fn an_empty_map_has_no_clusters() {
         let weights = [0; 4800];
-        assert!(KMeans::seed(cells(&weights), 3, Seeding::FarthestMean).clusters().len() <= 1);
+        let mut kmeans = KMeans::seed(cells(&weights));
+        assert!(!kmeans.grow(cells(&weights), 3, Seeding::FarthestMean));
+        assert!(kmeans.clusters().is_empty());
     }
 }

@@ -14,14 +14,16 @@ use super::lines::LAGS;
 use crate::event::Geometry;
 use crate::limits::{VISIT_CELLS, VISITS};
 use crate::math::{Turn, sqrt};
-use crate::store::Window;
+use crate::store::{Even, StoredEvent, Window};
 
 /// Time is counted in this many parts of the window; the bit below them holds the polarity.
 const TICKS_LOG2: u32 = 15;
 /// Most events of one cell of which pairs are made.
 const MOST_IN_CELL: usize = 128;
-/// Pairs in one step: a million instructions.
-const PAIRS_A_STEP: usize = 100_000;
+/// Pairs in one step: half a million instructions.
+const PAIRS_A_STEP: usize = 30_000;
+/// Events and cells of the map in one step, the same.
+const MAPPED_A_STEP: usize = 2_048;
 /// Power over chance of a cell and its neighbours, in standard deviations, from which on they are in step.
 const LEAST_SIGMAS: f32 = 3.5;
 /// The same as a share of the highest.
@@ -44,7 +46,7 @@ pub struct Visits {
     ends: [u16; VISIT_CELLS],
     /// Time in parts of the window, and polarity in the lowest bit, cell by cell, oldest first.
     times: [u16; VISITS],
-    /// Next cell to make pairs of.
+    /// Next cell to make pairs of, or to map.
     cell: usize,
     /// What unrelated events would add up to.
     chance: Chance,
@@ -95,28 +97,52 @@ impl Visits {
         CellGrid::fit(geometry, 2, if most < VISIT_CELLS { most } else { VISIT_CELLS })
     }
 
-    /// Takes in the events outside the discs in `taken`, evenly thinned to the capacity; returns their number, and with how
-    /// many of its own polarity an event shares its cell on average.
-    /// Cost: about 150 instructions an event.
-    pub fn fill(&mut self, window: &Window<'_>, grid: CellGrid, taken: &[Disc]) -> (usize, f32) {
+    /// Starts over on another grid, or outside other discs.
+    pub fn clear(&mut self, grid: CellGrid) {
         self.grid = grid;
-        self.window_us = window.duration_us.max(1);
         self.cell = 0;
         self.chance = Chance::default();
+        self.ends.fill(0);
+    }
+
+    /// Takes in the events of a segment outside the discs in `taken`, evenly thinned to the capacity; once all are in,
+    /// their number, and with how many of its own polarity an event shares its cell on average.
+    pub fn fill(
+        &mut self,
+        window: &Window<'_>,
+        taken: &[Disc],
+        filling: &mut Filling,
+    ) -> Option<(usize, f32)> {
+        let (grid, start_us) = (self.grid, window.start_us);
+        self.window_us = window.duration_us.max(1);
         let free = |x: u16, y: u16| {
             let at = Disc { x_px: f32::from(x), y_px: f32::from(y), radius_px: 0.0 };
             taken.iter().all(|disc| disc.distance2(&at) > disc.radius_px * disc.radius_px)
         };
-        let events = || {
-            let inside = |event: crate::store::StoredEvent| {
-                let cell = grid.index(event.x(), event.y());
-                (cell < VISIT_CELLS && free(event.x(), event.y())).then_some(cell)
-            };
-            window.even(VISITS, inside).1.take(VISITS)
+        let inside = |event: StoredEvent| {
+            let cell = grid.index(event.x(), event.y());
+            (cell < VISIT_CELLS && free(event.x(), event.y())).then_some(cell)
         };
-        self.ends.fill(0);
-        for (_, cell) in events() {
-            self.ends[cell] += 1;
+        let Filling { even, counted, left } = filling;
+        let take = |event: StoredEvent, cell: usize| {
+            if *left == 0 {
+                return;
+            }
+            *left -= 1;
+            let place = &mut self.ends[cell];
+            if *counted {
+                let tick = tick(event.since(start_us), self.window_us);
+                if let Some(time) = self.times.get_mut(usize::from(*place)) {
+                    *time = (tick << 1) | u16::from(event.is_on());
+                }
+            }
+            *place += 1;
+        };
+        if !even.step(window, VISITS, inside, take) {
+            return None;
+        }
+        if *counted {
+            return Some(self.filled());
         }
         // From counts to starts; placing the events turns starts into ends.
         let mut start = 0;
@@ -125,17 +151,13 @@ impl Visits {
             *end = start;
             start += count;
         }
-        for (event, cell) in events() {
-            let since_us = event.since(window.start_us).max(0) as u64;
-            // A last window may end before its last event.
-            let tick = (since_us << TICKS_LOG2) / u64::from(self.window_us);
-            let tick = tick.min((1 << TICKS_LOG2) - 1) as u16;
-            let place = &mut self.ends[cell];
-            if let Some(time) = self.times.get_mut(usize::from(*place)) {
-                *time = (tick << 1) | u16::from(event.is_on());
-                *place += 1;
-            }
-        }
+        even.again();
+        (*counted, *left) = (true, VISITS);
+        None
+    }
+
+    /// The number of events, and with how many of its own polarity an event shares its cell on average.
+    fn filled(&self) -> (usize, f32) {
         let company: f32 = (0..VISIT_CELLS)
             .map(|cell| {
                 let times = self.of(cell);
@@ -144,7 +166,8 @@ impl Visits {
                 on * (on - 1.0) + off * (off - 1.0)
             })
             .sum();
-        (usize::from(start), company / f32::from(start.max(1)))
+        let events = self.ends[VISIT_CELLS - 1];
+        (usize::from(events), company / f32::from(events.max(1)))
     }
 
     fn of(&self, cell: usize) -> &[u16] {
@@ -199,45 +222,84 @@ impl Visits {
 
     /// Writes how often each cell is visited as weights, row by row: the root, so that what passes slowly still counts.
     pub fn heat(&self, weights: &mut [u8]) {
+        let roots: [u8; 256] = core::array::from_fn(|n| (16.0 * sqrt(n as f32)).min(255.0) as u8);
         for (cell, weight) in weights.iter_mut().enumerate().take(VISIT_CELLS) {
             let events = self.of(cell).len();
-            let seen = events >= LEAST_HEAT;
-            *weight = if seen { (16.0 * sqrt(events as f32)).min(255.0) as u8 } else { 0 };
+            *weight = if events >= LEAST_HEAT { roots[events.min(roots.len() - 1)] } else { 0 };
         }
     }
 
-    /// Writes which cells keep step with a frequency as weights, row by row. A cell is judged
-    /// together with its neighbours, one to each side, or two where that shows too few.
-    /// Cost: about 60 instructions an event and 100 a cell.
-    pub fn map(&self, line_hz: f32, weights: &mut [u8]) {
-        for reach in 1..=MOST_REACH {
-            self.map_within(line_hz, weights, reach);
-            if weights.iter().filter(|weight| **weight > 0).count() >= LEAST_CELLS {
-                return;
-            }
-        }
+    /// Starts to map which cells keep step with a frequency.
+    pub const fn start_map(&mut self) {
+        self.cell = 0;
     }
 
-    fn map_within(&self, line_hz: f32, weights: &mut [u8], reach: usize) {
+    /// Writes the power over chance of some cells at a frequency as weights, row by row; `true` once all are written.
+    pub fn map(&mut self, line_hz: f32, weights: &mut [u8]) -> bool {
         let periods = line_hz * self.window_us as f32 * 1e-6;
         let per_tick = (periods * (1_u64 << (32 - TICKS_LOG2)) as f32) as u32;
-        for (cell, weight) in weights.iter_mut().enumerate().take(VISIT_CELLS) {
+        let cells = weights.len().min(VISIT_CELLS);
+        let mut mapped = 0;
+        while self.cell < cells && mapped < MAPPED_A_STEP {
             let mut sums = [Sum::default(); 2];
-            for time in self.of(cell) {
+            let times = self.of(self.cell);
+            for time in times {
                 let (sin, cos) = Turn(per_tick.wrapping_mul(u32::from(time >> 1))).sin_cos();
                 let sum = &mut sums[usize::from(time & 1)];
                 sum.re += cos;
                 sum.im += sin;
                 sum.count += 1.0;
             }
-            *weight = Excess::of(sums).pack();
+            mapped += 1 + times.len();
+            weights[self.cell] = Excess::of(sums).pack();
+            self.cell += 1;
         }
+        self.cell >= cells
+    }
+
+    /// Turns these powers into weights of the cells that keep step, zero for the others. A cell is judged together with its
+    /// neighbours, so many to each side; `true` unless more neighbours may show more.
+    pub fn judge(&self, weights: &mut [u8], reach: usize) -> bool {
         smooth(self.grid, weights, reach);
         let top = weights.iter().copied().max().unwrap_or(0);
         // Weights are roots.
         let floor = (f32::from(top) * sqrt(LEAST_SHARE)) as u8;
         weights.iter_mut().filter(|weight| **weight < floor).for_each(|weight| *weight = 0);
+        reach >= MOST_REACH || weights.iter().filter(|weight| **weight > 0).count() >= LEAST_CELLS
     }
+}
+
+/// How far a filling has got.
+#[derive(Clone, Copy, Debug)]
+pub struct Filling {
+    even: Even,
+    /// Whether each cell's events were counted, and are placed now.
+    counted: bool,
+    /// Events for which there is room.
+    left: usize,
+}
+
+impl Default for Filling {
+    fn default() -> Self {
+        Self { even: Even::default(), counted: false, left: VISITS }
+    }
+}
+
+/// When an event came, in parts of the window.
+fn tick(since_us: i32, window_us: u32) -> u16 {
+    const MOST: u32 = (1 << TICKS_LOG2) - 1;
+    const HIGH_LOG2: u32 = 10;
+    let since_us = since_us.max(0) as u32;
+    // A last window may end before its last event.
+    if since_us >= window_us {
+        return MOST as u16;
+    }
+    // In two divisions of 32 bits, as the processor divides no 64: exact for windows of up to four seconds.
+    let coarser = HIGH_LOG2.saturating_sub(window_us.leading_zeros());
+    let (since_us, window_us) = (since_us >> coarser, (window_us >> coarser).max(1));
+    let (high, rest) = ((since_us << HIGH_LOG2) / window_us, (since_us << HIGH_LOG2) % window_us);
+    let low = (rest << (TICKS_LOG2 - HIGH_LOG2)) / window_us;
+    ((high << (TICKS_LOG2 - HIGH_LOG2)) + low).min(MOST) as u16
 }
 
 /// Power over chance of a cell, in a byte.
@@ -264,41 +326,53 @@ impl Excess {
         (halves << 2) | self.banks
     }
 
-    fn unpack(packed: u8) -> Self {
-        Self { power: f32::from(packed >> 2) * 0.5 - 1.75, banks: packed & 3 }
+    /// Four times the power, above eight bits that hold the banks, so that one sum adds up both; 0 without banks.
+    const fn unpack(packed: u8) -> i32 {
+        let (halves, banks) = ((packed >> 2) as i32, (packed & 3) as i32);
+        if banks == 0 { 0 } else { ((2 * halves - 7) << 8) + banks }
     }
 }
 
+/// Most banks around a cell.
+const MOST_BANKS: usize = 2 * (2 * MOST_REACH + 1) * (2 * MOST_REACH + 1);
+
 /// Sums up each cell and its neighbours and writes the root of their significance, zero below [`LEAST_SIGMAS`].
 fn smooth(grid: CellGrid, cells: &mut [u8], reach: usize) {
+    const ROWS: usize = MOST_REACH + 1;
     let columns = grid.columns.min(MOST_COLUMNS);
+    let roots: [f32; MOST_BANKS + 1] = core::array::from_fn(|banks| sqrt(banks.max(1) as f32));
+    let weight = |around: i32| {
+        let power = 0.25 * (around >> 8) as f32;
+        let sigmas = power / roots.get((around & 0xFF) as usize).copied().unwrap_or(f32::MAX);
+        if sigmas < LEAST_SIGMAS { 0 } else { (16.0 * sqrt(sigmas)).min(255.0) as u8 }
+    };
     // The rows above and the row at hand, as they were.
-    let mut before = [[0_u8; MOST_COLUMNS]; MOST_REACH + 1];
+    let mut before = [[0_u8; MOST_COLUMNS]; ROWS];
     for row in 0..grid.rows {
         let start = row * grid.columns;
         let Some(line) = cells.get(start..start + columns) else { return };
-        before[row % (MOST_REACH + 1)][..columns].copy_from_slice(line);
-        for column in 0..columns {
-            let around = column.saturating_sub(reach)..(column + reach + 1).min(columns);
-            let (mut power, mut banks) = (0.0, 0_u8);
-            let mut add = |packed: &u8| {
-                let excess = Excess::unpack(*packed);
-                if excess.banks > 0 {
-                    power += excess.power;
-                    banks += excess.banks;
+        before[row % ROWS][..columns].copy_from_slice(line);
+        let rows_above = reach.min(row) + 1;
+        // Sums of the columns around the cell at hand, and of all of them.
+        let (mut sums, mut oldest, mut around) = ([0; 2 * MOST_REACH + 1], 0, 0);
+        for column in 0..columns + reach {
+            let mut sum = 0;
+            if column < columns {
+                let mut above = row % ROWS;
+                for _ in 0..rows_above {
+                    sum += Excess::unpack(before[above][column]);
+                    above = if above == 0 { ROWS - 1 } else { above - 1 };
                 }
-            };
-            for above in row.saturating_sub(reach)..=row {
-                before[above % (MOST_REACH + 1)][around.clone()].iter().for_each(&mut add);
+                for below in 1..=reach {
+                    let cell = cells.get(start + below * grid.columns + column);
+                    sum += cell.map_or(0, |packed| Excess::unpack(*packed));
+                }
             }
-            for below in row + 1..=row + reach {
-                let from = below * grid.columns;
-                let line = cells.get(from + around.start..from + around.end);
-                line.unwrap_or(&[]).iter().for_each(&mut add);
+            around += sum - core::mem::replace(&mut sums[oldest], sum);
+            oldest = if oldest == 2 * reach { 0 } else { oldest + 1 };
+            if let Some(column) = column.checked_sub(reach) {
+                cells[start + column] = weight(around);
             }
-            let sigmas = power / sqrt(f32::from(banks.max(1)));
-            let weight = if sigmas < LEAST_SIGMAS { 0.0 } else { 16.0 * sqrt(sigmas) };
-            cells[start + column] = weight.min(255.0) as u8;
         }
     }
 }

@@ -69,7 +69,7 @@ fn collect(
     (region, total)
 }
 
-/// The search for the axis and winding number that explain a region best, a row of centres a step.
+/// The search for the axis and winding number that explain a region best, a centre a step.
 ///
 /// Centres lie on a square of 0.6 radius to each side of the disc's centre, then on ever smaller ones around the best.
 #[derive(Debug, Default)]
@@ -86,6 +86,7 @@ pub struct Explainer {
     spacing_px: f32,
     halvings: u8,
     row: i32,
+    column: i32,
     best: Winding,
 }
 
@@ -104,14 +105,22 @@ impl Explainer {
         self.begin(disc);
     }
 
-    /// Starts over with single events as phasors, `total` before thinning: where there are too few for a phase in each cell.
-    pub fn start_events(&mut self, events: impl Iterator<Item = Phasor>, total: usize, disc: Disc) {
+    /// Starts over with single events as phasors, to be [added](Self::add): where there are too few for a phase in each cell.
+    pub fn start_events(&mut self, disc: Disc) {
         self.region.clear();
-        self.region.extend(events.take(WINDING_PHASORS));
-        self.total = total;
         self.cell_px = None;
         self.most = MOST_WINDINGS;
         self.begin(disc);
+    }
+
+    /// Adds an event, while there is room.
+    pub fn add(&mut self, event: Phasor) {
+        self.region.push(event).ok();
+    }
+
+    /// All events were added, out of so many before thinning.
+    pub const fn collected(&mut self, total: usize) {
+        self.total = total;
     }
 
     fn begin(&mut self, disc: Disc) {
@@ -119,28 +128,30 @@ impl Explainer {
         self.from = (disc.x_px, disc.y_px);
         self.spacing_px = COARSE_SPACING * disc.radius_px;
         self.halvings = 0;
-        self.row = -COARSE_STEPS;
+        (self.row, self.column) = (-COARSE_STEPS, -COARSE_STEPS);
         self.best = Winding::default();
     }
 
-    /// Tries a row of centres; `true` once the best is found.
-    /// Cost: about 400 instructions a phasor and centre, 7 centres at most.
+    /// Tries a centre; `true` once the best is found. Cost: about 900 instructions a phasor.
     pub fn step(&mut self) -> bool {
         let steps = if self.halvings == 0 { COARSE_STEPS } else { 1 };
-        for column in -steps..=steps {
-            let x_px = self.from.0 + column as f32 * self.spacing_px;
-            let y_px = self.from.1 + self.row as f32 * self.spacing_px;
-            let found = about(&self.region, x_px, y_px, self.disc.radius_px, self.most);
-            if found.share > self.best.share {
-                self.best = found;
-            }
+        let x_px = self.from.0 + self.column as f32 * self.spacing_px;
+        let y_px = self.from.1 + self.row as f32 * self.spacing_px;
+        let found = about(&self.region, x_px, y_px, self.disc.radius_px, self.most);
+        if found.share > self.best.share {
+            self.best = found;
         }
+        self.column += 1;
+        if self.column <= steps {
+            return false;
+        }
+        self.column = -steps;
         self.row += 1;
         if self.row > steps {
             self.halvings += 1;
             self.spacing_px *= 0.5;
             self.from = (self.best.x_px, self.best.y_px);
-            self.row = -1;
+            (self.row, self.column) = (-1, -1);
         }
         self.halvings > HALVINGS
     }

@@ -4,18 +4,19 @@ mod baselines;
 mod doubt;
 mod verdict;
 
+use super::angular::AngularSums;
 use super::baseline::{Estimate, Pairs};
 use super::initial::{Ladder, Rates, median};
 use super::path::Path;
-use super::phase::{Pattern, harmonics, newton};
+use super::phase::{Pattern, harmonics, newton, scan};
 use super::polar::{PolarEvent, PolarTrack, track};
 use super::pose::{Pose, Sums};
-use super::symmetry::symmetry;
+use super::symmetry::{symmetry, turn_back};
 use crate::math::TAU;
 use crate::reading::{Evidence, Frame, Reason, Speed, Status};
 use crate::registration::Icp;
 use crate::rotors::{Disc, Found};
-use crate::store::{WINDOW_SEGMENTS, Window};
+use crate::store::{Even, WINDOW_SEGMENTS, Window};
 use baselines::{REFINEMENT, REFINEMENT_PERIODS};
 use doubt::{DOUBTFUL, Doubt};
 
@@ -34,6 +35,8 @@ const COARSE_AGREEMENT: f32 = 0.15;
 const MOST_COARSE_AGREEMENT: f32 = 0.25;
 /// Two harmonics of one line differ by a fifteenth or more.
 const SCAN_AGREEMENT: f32 = 0.04;
+/// Events that a look at their harmonics takes in in one step: half a million instructions.
+const EVENTS_A_STEP: usize = 768;
 /// Fewest events of a rotor that are measured.
 const LEAST_EVENTS: usize = 300;
 /// Symmetry periods and revolutions that a lock needs in the window.
@@ -65,10 +68,13 @@ pub struct Stated {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Stage {
     #[default]
+    /// Collecting the rotor's events.
+    Track,
     Newton,
     Scan,
     Doubt,
     Symmetry,
+    Overtone,
     Pose,
     Initial,
     Refinement,
@@ -84,11 +90,20 @@ enum Stage {
 pub struct Bench {
     icp: Icp,
     sums: Sums,
+    angular: AngularSums,
+    /// How the events of the window are gone through.
+    even: Even,
 }
 
 impl Bench {
     /// Nothing on it. A constant, so that it is copied into place instead of being built on the stack.
-    pub const EMPTY: Self = Self { icp: Icp::EMPTY, sums: Sums::EMPTY };
+    pub const EMPTY: Self =
+        Self { icp: Icp::EMPTY, sums: Sums::EMPTY, angular: AngularSums::EMPTY, even: Even::EMPTY };
+
+    /// Makes ready for another measurement, whatever was left half done.
+    pub const fn clear(&mut self) {
+        self.even = Even::EMPTY;
+    }
 }
 
 /// The measurement of one rotor.
@@ -134,7 +149,7 @@ impl Measurement {
     #[must_use]
     pub fn new(found: &Found) -> Self {
         Self {
-            stage: Stage::Newton,
+            stage: Stage::Track,
             turn: 0,
             follows: false,
             second_look: false,
@@ -182,13 +197,15 @@ impl Measurement {
         polar: &mut PolarTrack,
         bench: &mut Bench,
     ) -> bool {
-        let Bench { icp, sums } = bench;
+        let Bench { icp, sums, angular, even } = bench;
         match self.stage {
+            Stage::Track => self.track(window, polar, even),
             Stage::Newton => self.newton(window, polar),
-            Stage::Scan => self.scan(polar),
-            Stage::Doubt => self.doubt(window, polar),
-            Stage::Symmetry => self.symmetry(stated, polar),
-            Stage::Pose => self.pose(window, sums),
+            Stage::Scan => self.scan(polar, angular),
+            Stage::Doubt => self.doubt(window, polar, angular, even),
+            Stage::Symmetry => self.symmetry(stated, polar, angular),
+            Stage::Overtone => self.overtone(polar),
+            Stage::Pose => self.pose(window, sums, even),
             Stage::Initial => self.initial(window, icp),
             Stage::Refinement => self.refinement(window, icp),
             Stage::Further => self.further(window, icp),
@@ -207,9 +224,9 @@ impl Measurement {
     #[must_use]
     pub const fn stage(&self) -> &'static str {
         match self.stage {
-            Stage::Newton => "centre",
+            Stage::Track | Stage::Newton => "centre",
             Stage::Scan | Stage::Doubt => "scan",
-            Stage::Symmetry => "symmetry",
+            Stage::Symmetry | Stage::Overtone => "symmetry",
             Stage::Pose => "pose",
             Stage::Initial => "initial",
             Stage::Refinement => "refinement",
@@ -226,23 +243,26 @@ impl Measurement {
         self.stage = Stage::Done;
     }
 
-    /// Centre and speed by the polar phase, a Newton step at a time.
-    fn newton(&mut self, window: &Window<'_>, polar: &mut PolarTrack) {
-        if self.turn == 0 {
-            self.events = track(window, self.disc, polar);
-            self.turn = 1;
-            return;
+    /// Collects the rotor's events, a segment at a time.
+    fn track(&mut self, window: &Window<'_>, polar: &mut PolarTrack, even: &mut Even) {
+        if track(window, self.disc, polar, even) {
+            self.events = core::mem::take(even).count();
+            self.stage = Stage::Newton;
         }
+    }
+
+    /// Centre and speed by the polar phase, a Newton step at a time.
+    fn newton(&mut self, window: &Window<'_>, polar: &PolarTrack) {
         self.evidence.events = self.events as u32;
         if self.events < LEAST_EVENTS {
             return self.refuse(Reason::TooFewEvents);
         }
-        if self.turn <= NEWTON_STEPS {
-            match self.step_centre(window, polar) {
-                None => self.refuse(Reason::NoRotation),
-                Some(true) => self.turn = NEWTON_STEPS + 1,
-                Some(false) => self.turn += 1,
-            }
+        if self.turn < NEWTON_STEPS {
+            let Some(last) = self.step_centre(window, polar) else {
+                return self.refuse(Reason::NoRotation);
+            };
+            self.turn = if last { NEWTON_STEPS } else { self.turn + 1 };
+            self.stage = Stage::Track;
             return;
         }
         let coherence =
@@ -251,6 +271,7 @@ impl Measurement {
         if coherence < self.least_coherence() {
             return self.refuse(Reason::NoRotation);
         }
+        self.turn = 0;
         self.stage = Stage::Scan;
     }
 
@@ -265,9 +286,17 @@ impl Measurement {
     }
 
     /// Which harmonic of the line turns about the refined centre: first coarse witness.
-    fn scan(&mut self, polar: &[PolarEvent]) {
+    fn scan(&mut self, polar: &[PolarEvent], angular: &mut AngularSums) {
         let line_hz = self.omega_rad_s.abs() * self.harmonic as f32 / TAU;
-        let scan = harmonics(polar, self.disc, line_hz);
+        if self.turn == 0 {
+            angular.clear();
+        }
+        let (events, all) = self.next_events(polar);
+        scan(angular, events, self.disc, line_hz);
+        if !all {
+            return;
+        }
+        let scan = harmonics(angular);
         let standing = scan.second_share / scan.share.max(1e-3);
         let rival = scan.rival_share / scan.share.max(1e-3);
         self.evidence.scan_rad_s = (scan.best != 0).then(|| self.line_hz * TAU / scan.best as f32);
@@ -290,7 +319,7 @@ impl Measurement {
             self.omega_rad_s = omega_rad_s;
             self.harmonic = scan.best.unsigned_abs();
             self.turn = 0;
-            self.stage = Stage::Newton;
+            self.stage = Stage::Track;
             return;
         }
         if standing > MOST_STANDING {
@@ -301,11 +330,34 @@ impl Measurement {
         self.stage = Stage::Symmetry;
     }
 
+    /// The rotor's events of the next step, and whether they are the last.
+    fn next_events<'p>(&mut self, polar: &'p [PolarEvent]) -> (&'p [PolarEvent], bool) {
+        let from = usize::from(self.turn) * EVENTS_A_STEP;
+        let to = (from + EVENTS_A_STEP).min(polar.len());
+        self.turn += 1;
+        (polar.get(from..to).unwrap_or(&[]), to == polar.len())
+    }
+
     /// Angle of symmetry.
-    fn symmetry(&mut self, stated: &Stated, polar: &[PolarEvent]) {
-        let symmetry = symmetry(polar, self.disc, self.omega_rad_s);
+    fn symmetry(&mut self, stated: &Stated, polar: &[PolarEvent], angular: &mut AngularSums) {
+        if self.turn == 0 {
+            angular.clear();
+        }
+        let (events, all) = self.next_events(polar);
+        turn_back(angular, events, self.disc, self.omega_rad_s);
+        if !all {
+            return;
+        }
+        let symmetry = symmetry(angular);
         self.parts = stated.blades.or(symmetry.parts);
-        // The line may be an overtone of the blades' own.
+        self.alike =
+            self.parts == Some(1) || stated.blades.is_none() && symmetry.score >= ALIKE_SCORE;
+        self.evidence.symmetry_score = Some(symmetry.score);
+        self.stage = Stage::Overtone;
+    }
+
+    /// Whether the line is an overtone of the blades' own.
+    fn overtone(&mut self, polar: &[PolarEvent]) {
         if let Some(parts) = self.parts.map(u32::from).filter(|parts| *parts > 0) {
             let at =
                 |harmonic| Pattern::learn(polar, self.disc, self.omega_rad_s, harmonic).coherence();
@@ -313,9 +365,6 @@ impl Measurement {
                 self.harmonic = parts;
             }
         }
-        self.alike =
-            self.parts == Some(1) || stated.blades.is_none() && symmetry.score >= ALIKE_SCORE;
-        self.evidence.symmetry_score = Some(symmetry.score);
         let rpm = self.omega_rad_s.abs() * Speed::RPM_PER_RAD_S;
         let blades = f32::from(self.parts.unwrap_or(1));
         if rpm > MOST_RPM || rpm * blades > MOST_BLADE_RPM {
@@ -326,7 +375,7 @@ impl Measurement {
     }
 
     /// Follows the rotor's pose through the window, a round at a time: second witness of the lock.
-    fn pose(&mut self, window: &Window<'_>, sums: &mut Sums) {
+    fn pose(&mut self, window: &Window<'_>, sums: &mut Sums, even: &mut Even) {
         if self.turn == 0 {
             self.turn = 1;
             let parts = if self.alike { u32::from(self.parts.unwrap_or(1)).max(1) } else { 1 };
@@ -335,7 +384,7 @@ impl Measurement {
             let pose = if self.alike { pose } else { pose.unlike(self.parts.unwrap_or(1)) };
             self.pose = if self.follows { pose.known() } else { pose };
         }
-        if !self.pose.step(window, sums) {
+        if !self.pose.step(window, sums, even) {
             return;
         }
         self.turn = 0;
@@ -371,14 +420,13 @@ impl Measurement {
     }
 
     /// One Newton step of centre and speed: whether it was so small that it is the last, or `None` when the phase gives none.
-    fn step_centre(&mut self, window: &Window<'_>, polar: &mut PolarTrack) -> Option<bool> {
+    fn step_centre(&mut self, window: &Window<'_>, polar: &PolarTrack) -> Option<bool> {
         let step = newton(polar, self.disc, self.omega_rad_s, self.harmonic, window.duration_us)?;
         let reach_px = 0.3 * self.disc.radius_px;
         // Not `clamp`, whose panic on a wrong order of bounds pulls float formatting into the image.
         self.disc.x_px += step.dx_px.max(-reach_px).min(reach_px);
         self.disc.y_px += step.dy_px.max(-reach_px).min(reach_px);
         self.omega_rad_s += step.domega_rad_s;
-        self.events = track(window, self.disc, polar);
         let half_s = 0.5e-6 * window.duration_us as f32;
         let turned_px = step.domega_rad_s * half_s * self.disc.radius_px;
         Some(step.dx_px.abs().max(step.dy_px.abs()).max(turned_px.abs()) < LAST_STEP_PX)

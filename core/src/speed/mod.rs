@@ -1,5 +1,6 @@
 //! Rotational speed estimation (paper, section "Rotational Speed Estimation").
 
+pub mod angular;
 pub mod baseline;
 pub mod initial;
 pub mod measurement;

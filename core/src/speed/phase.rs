@@ -8,14 +8,13 @@
 
 use nalgebra::{Matrix4, Vector4};
 
+use super::angular::{AngularSums, BANKS, TERMS};
 use super::polar::PolarEvent;
 use crate::math::{TAU, Turn, TurnRate, larger};
 use crate::rotors::Disc;
 
-/// Rings between centre and rim.
-pub const RINGS: usize = 8;
-/// Banks: a ring for each polarity.
-const BANKS: usize = 2 * RINGS;
+/// Rings between centre and rim, each for both polarities.
+const RINGS: usize = BANKS / 2;
 
 /// Phases of the rotor's pattern by ring and polarity.
 #[derive(Clone, Copy, Debug, Default)]
@@ -67,8 +66,8 @@ impl Pattern {
     }
 }
 
-/// Highest angular harmonic that [`harmonics`] tries.
-const MOST_HARMONIC: usize = 16;
+/// Highest angular harmonic that a [`scan`] tries.
+const MOST_HARMONIC: usize = TERMS / 2;
 
 /// Which angular harmonic keeps step with a frequency best.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -85,38 +84,40 @@ pub struct Harmonics {
     pub rival_share: f32,
 }
 
-/// Tries all harmonics from -16 to 16 at one frequency in Hz. Cost: about 400 instructions an event.
-#[must_use]
-pub fn harmonics(track: &[PolarEvent], disc: Disc, line_hz: f32) -> Harmonics {
-    const TERMS: usize = 2 * MOST_HARMONIC + 1;
+/// Adds events to a look at all harmonics from -16 to 16 at one frequency in Hz. Cost: about 700 instructions an event.
+pub fn scan(angular: &mut AngularSums, track: &[PolarEvent], disc: Disc, line_hz: f32) {
     let rate = TurnRate::from_rad_s(line_hz * TAU);
-    let mut sums = [[(0.0_f32, 0.0_f32); TERMS]; BANKS];
-    let mut counts = [0_u32; BANKS];
     for event in track {
         let bank = bank(*event, disc);
-        counts[bank] += 1;
+        angular.counts[bank] += 1;
+        let sums = &mut angular.sums[bank];
         let (sin_t, cos_t) = rate.after(event.t_us).sin_cos();
         let (sin, cos) = event.angle().sin_cos();
         let (mut c, mut s) = (1.0_f32, 0.0_f32);
         for m in 0..=MOST_HARMONIC {
             // exp(i (m theta - 2 pi f t)) and exp(i (-m theta - 2 pi f t))
             let (cc, ss, sc, cs) = (c * cos_t, s * sin_t, s * cos_t, c * sin_t);
-            let plus = &mut sums[bank][MOST_HARMONIC + m];
+            let plus = &mut sums[MOST_HARMONIC + m];
             plus.0 += cc + ss;
             plus.1 += sc - cs;
             if m > 0 {
-                let minus = &mut sums[bank][MOST_HARMONIC - m];
+                let minus = &mut sums[MOST_HARMONIC - m];
                 minus.0 += cc - ss;
                 minus.1 -= sc + cs;
             }
             (c, s) = (c * cos - s * sin, s * cos + c * sin);
         }
     }
+}
+
+/// Which harmonics of a [`scan`] keep step.
+#[must_use]
+pub fn harmonics(angular: &AngularSums) -> Harmonics {
     let mut shares = [0.0_f32; TERMS];
     let mut found = Harmonics::default();
     for (term, share) in shares.iter_mut().enumerate() {
-        let mut pattern = Pattern { counts, ..Pattern::default() };
-        for (sum, bank) in pattern.sums.iter_mut().zip(&sums) {
+        let mut pattern = Pattern { counts: angular.counts, ..Pattern::default() };
+        for (sum, bank) in pattern.sums.iter_mut().zip(&angular.sums) {
             *sum = bank[term];
         }
         *share = pattern.coherence();

@@ -5,7 +5,7 @@ use heapless::Vec;
 use crate::limits::POLAR_EVENTS;
 use crate::math::{Turn, quick_sqrt};
 use crate::rotors::Disc;
-use crate::store::{StoredEvent, Window};
+use crate::store::{Even, StoredEvent, Window};
 
 /// Inner edge of the annulus that is measured, as a share of the radius: nearer to the centre one pixel
 /// spans too large an angle.
@@ -90,15 +90,20 @@ impl PolarEvent {
 /// A rotor's events, evenly thinned to the capacity.
 pub type PolarTrack = Vec<PolarEvent, POLAR_EVENTS>;
 
-/// Fills `track` with the rotor's events of the window and returns how many there were before thinning.
+/// Fills `track` with the rotor's events of the window, a segment a call; `true` once all are in it.
 /// Cost: about 200 instructions for each event in the annulus.
-pub fn track(window: &Window<'_>, disc: Disc, track: &mut PolarTrack) -> usize {
-    track.clear();
+pub fn track(window: &Window<'_>, disc: Disc, track: &mut PolarTrack, tracking: &mut Even) -> bool {
     let annulus = Annulus::of(disc);
     let mid_us = (window.duration_us / 2) as i32;
-    let (total, even) = window.even(POLAR_EVENTS, |event| annulus.place(event));
-    for (event, place) in even {
-        track.push(PolarEvent::new(event, place, window.start_us, mid_us)).ok();
+    if !tracking.is_weighed() {
+        track.clear();
     }
-    total
+    tracking.step(
+        window,
+        POLAR_EVENTS,
+        |event| annulus.place(event),
+        |event, place| {
+            track.push(PolarEvent::new(event, place, window.start_us, mid_us)).ok();
+        },
+    )
 }

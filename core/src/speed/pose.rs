@@ -23,7 +23,7 @@ use super::trend::{Point, Trend};
 use crate::limits::MAX_KNOTS;
 use crate::math::{TAU, Turn, TurnRate, larger, quick_sqrt, sqrt};
 use crate::rotors::Disc;
-use crate::store::Window;
+use crate::store::{Even, Window};
 use blocks::{
     BLOCK_SHARE, Block, LEAST_SHARE, MOST_FINE_WALK, MOST_WALK, WALK_PX, WALK_SINGLE_PX, WALK_US,
     Walk, correct,
@@ -239,20 +239,19 @@ impl Pose {
         self.slope.as_ref()
     }
 
-    /// Looks at one more segment of the window, and where that ends a round corrects the path and learns the
+    /// Weighs one more segment of the window, or looks at it, and where that ends a round corrects the path and learns the
     /// template anew; `true` once all rounds are done. Cost: about 180 instructions an event.
-    pub fn step(&mut self, window: &Window<'_>, sums: &mut Sums) -> bool {
+    pub fn step(&mut self, window: &Window<'_>, sums: &mut Sums, even: &mut Even) -> bool {
         if !self.started {
-            self.started = true;
             let disc = Moving::new(self.disc, &self.path, window);
-            let (mut arrived, mut coarsest) = (0_u64, 0);
-            for event in window.events().filter(|event| disc.place(*event).is_some()) {
-                self.events += 1;
-                arrived += 1 << event.weight_log2();
-                coarsest = coarsest.max(event.weight_log2());
+            if even.weigh(window, |event| disc.place(event).is_some()) {
+                self.started = true;
+                self.events = even.count();
+                self.even_share = even.share();
+                *even = Even::EMPTY;
+                self.divide();
             }
-            self.even_share = (arrived >> coarsest) as f32 / (self.events as f32).max(1.0);
-            self.divide();
+            return false;
         }
         if self.segment == 0 {
             *sums = Sums::EMPTY;

@@ -37,12 +37,9 @@ fn even_events_stand_for_the_same_number_each() {
     let mut memory = [StoredEvent::default(); 64 * SEGMENTS];
     let mut store = Store::new(&mut memory, 10_000);
     fill(&mut store, 0..60_000);
-    let kept: Vec<_> = store
-        .window(6, u64::MAX)
-        .even(100, |event| Some(event.since(0)))
-        .1
-        .map(|(_, t_us)| t_us)
-        .collect();
+    let (window, mut even, mut kept) = (store.window(6, u64::MAX), Even::default(), Vec::new());
+    let since = |event: StoredEvent| Some(event.since(0));
+    while !even.step(&window, 100, since, |_, t_us| kept.push(t_us)) {}
     assert!(kept.len() > 80 && kept.len() <= 101, "{}", kept.len());
     // The reservoir itself comes in steps of 512, and begins anew behind each burst.
     let gaps: Vec<i32> = kept.windows(2).map(|pair| pair[1] - pair[0]).collect();

@@ -80,39 +80,6 @@ impl<'a> Window<'a> {
         parts.into_iter().take(self.segments).flat_map(|part| part.iter().copied())
     }
 
-    /// Events that each stand for the same number of arrived ones, at most `most` of those for which `inside` gives a value,
-    /// and how many of these are stored.
-    ///
-    /// The stored events are dense at the start of each segment; whoever looks for frequencies must not take
-    /// that rhythm for one of the scene.
-    pub fn even<T: Copy>(
-        &self,
-        most: usize,
-        inside: impl Fn(StoredEvent) -> Option<T>,
-    ) -> (usize, impl Iterator<Item = (StoredEvent, T)>) {
-        let (mut count, mut weight, mut coarsest) = (0, 0_u64, 0);
-        for event in self.events() {
-            if inside(event).is_some() {
-                count += 1;
-                weight += 1 << event.weight_log2();
-                coarsest = coarsest.max(event.weight_log2());
-            }
-        }
-        // Fixed-point, so that any ratio thins evenly.
-        let stride = ((weight << 8) / most.max(1) as u64 + 1).max(1 << (coarsest + 8));
-        let (mut passed, mut next) = (0_u64, 0_u64);
-        let even = self.events().filter_map(move |event| {
-            let value = inside(event)?;
-            let kept = passed >= next;
-            passed += 1 << (event.weight_log2() + 8);
-            if kept {
-                next += stride;
-            }
-            kept.then_some((event, value))
-        });
-        (count, even)
-    }
-
     /// Number of stored events.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -40,7 +40,7 @@ impl Tachometer<'_> {
         self.job = Job::Search(Extraction::default());
     }
 
-    /// Advances the measurement by at most `steps` steps, each of a few million instructions at most (`evtach bench cost`).
+    /// Advances the measurement by at most `steps` steps, each of less than a million instructions with the device's memory (`evtach bench cost`).
     pub fn poll(&mut self, steps: u32) -> Poll {
         for _ in 0..steps {
             if self.window_segments == 0 {
@@ -68,7 +68,7 @@ impl Tachometer<'_> {
                     for candidate in extraction.candidates() {
                         self.candidates.push(Suspect { found: *candidate, followed: None }).ok();
                     }
-                    return self.measure_next(0);
+                    self.measure_next(0);
                 }
                 false
             }
@@ -91,7 +91,8 @@ impl Tachometer<'_> {
                     return false;
                 }
                 self.keep(outcome);
-                self.measure_next(index + 1)
+                self.measure_next(index + 1);
+                false
             }
         }
     }
@@ -118,8 +119,9 @@ impl Tachometer<'_> {
         }
     }
 
-    /// Starts measuring the next candidate from `index` on that no measured rotor overlaps; `true` when none is left.
-    fn measure_next(&mut self, index: usize) -> bool {
+    /// Starts measuring the next candidate from `index` on that no measured rotor overlaps; where none is left, what remains is to
+    /// conclude, in a step of its own.
+    fn measure_next(&mut self, index: usize) {
         let taken = |disc: &Disc| {
             let measured = |o: &&Outcome| o.status.reason().is_none();
             self.outcomes.iter().filter(measured).any(|o| o.found.disc.overlaps(disc))
@@ -127,10 +129,11 @@ impl Tachometer<'_> {
         let next = (index..self.candidates.len()).find(|i| !taken(&self.candidates[*i].found.disc));
         let Some(next) = next else {
             self.job = Job::Idle;
-            return true;
+            return;
         };
-        if !matches!(self.scratch, Scratch::Measure(_)) {
-            self.scratch = Scratch::Measure(Bench::EMPTY);
+        match &mut self.scratch {
+            Scratch::Measure(bench) => bench.clear(),
+            Scratch::Search(_) => self.scratch = Scratch::Measure(Bench::EMPTY),
         }
         let Suspect { found, followed } = self.candidates[next];
         let measurement = match followed {
@@ -138,6 +141,5 @@ impl Tachometer<'_> {
             None => Measurement::new(&found),
         };
         self.job = Job::Measure(next, measurement);
-        false
     }
 }

@@ -15,6 +15,10 @@ pub use session::{Plugged, Session, Used, run_instrument};
 /// Instructions in one tick of the board's 25 MHz timers, at QEMU's `-icount shift=0`.
 pub const INSTRUCTIONS_PER_TICK: u64 = 40;
 
+/// Instructions that a step of the measurement may take at most: while it runs no event is taken in, and the blocks between
+/// acquiring and measuring hold 4 ms at 1 Mev/s.
+pub const MOST_IN_STEP: u64 = 1_000_000;
+
 /// Why the device gave no answer.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]

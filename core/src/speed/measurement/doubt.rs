@@ -5,9 +5,10 @@
 use super::{Measurement, Stage};
 use crate::math::TAU;
 use crate::rotors::Disc;
-use crate::speed::phase::harmonics;
+use crate::speed::angular::AngularSums;
+use crate::speed::phase::{harmonics, scan};
 use crate::speed::polar::{PolarTrack, track};
-use crate::store::Window;
+use crate::store::{Even, Window};
 
 /// Share in step of the second best harmonic over that of the best from which on they are in doubt.
 pub(super) const DOUBTFUL: f32 = 0.3;
@@ -16,17 +17,18 @@ const IN_DOUBT: f32 = 0.6;
 /// Radius in pixels below which a centre that is off by two or three pixels fits the overtone as well.
 const SMALL_PX: f32 = 20.0;
 /// Places to each side of the centre, and how far they are apart in radii.
-const PLACES: i32 = 3;
+const PLACES: i8 = 3;
 const SPACING: f32 = 0.1;
 /// Events that a place is judged by.
 const MOST_EVENTS: usize = 512;
 
-/// The look about the centre, a row of places a step.
+/// The look about the centre, place by place.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Doubt {
     disc: Disc,
     line_hz: f32,
-    row: i32,
+    row: i8,
+    column: i8,
     /// Share in step at the best place with its best harmonic.
     share: f32,
     best: (Disc, i32),
@@ -34,30 +36,43 @@ pub(super) struct Doubt {
 
 impl Doubt {
     pub(super) const fn new(disc: Disc, line_hz: f32) -> Self {
-        Self { disc, line_hz, row: -PLACES, share: 0.0, best: (disc, 0) }
+        Self { disc, line_hz, row: -PLACES, column: -PLACES, share: 0.0, best: (disc, 0) }
     }
 
-    /// Asks a row of places; `true` once all are asked. Cost: three million instructions.
-    fn step(&mut self, window: &Window<'_>, polar: &mut PolarTrack) -> bool {
+    /// Collects a segment's events about a place, or asks the place; `true` once all are asked.
+    fn step(
+        &mut self,
+        window: &Window<'_>,
+        polar: &mut PolarTrack,
+        angular: &mut AngularSums,
+        even: &mut Even,
+    ) -> bool {
         let spacing_px = SPACING * self.disc.radius_px;
-        for column in -PLACES..=PLACES {
-            let x_px = self.disc.x_px + column as f32 * spacing_px;
-            let y_px = self.disc.y_px + self.row as f32 * spacing_px;
-            let place = Disc { x_px, y_px, ..self.disc };
-            track(window, place, polar);
-            let stride = polar.len().div_ceil(MOST_EVENTS).max(1);
-            let mut index = 0;
-            polar.retain(|_| {
-                index += 1;
-                index % stride == 0
-            });
-            let found = harmonics(polar, place, self.line_hz);
-            if found.share > self.share {
-                self.share = found.share;
-                self.best = (place, found.best);
-            }
+        let x_px = self.disc.x_px + f32::from(self.column) * spacing_px;
+        let y_px = self.disc.y_px + f32::from(self.row) * spacing_px;
+        let place = Disc { x_px, y_px, ..self.disc };
+        if !track(window, place, polar, even) {
+            return false;
         }
-        self.row += 1;
+        *even = Even::EMPTY;
+        let stride = polar.len().div_ceil(MOST_EVENTS).max(1);
+        let mut index = 0;
+        polar.retain(|_| {
+            index += 1;
+            index % stride == 0
+        });
+        angular.clear();
+        scan(angular, polar, place, self.line_hz);
+        let found = harmonics(angular);
+        if found.share > self.share {
+            self.share = found.share;
+            self.best = (place, found.best);
+        }
+        self.column += 1;
+        if self.column > PLACES {
+            self.column = -PLACES;
+            self.row += 1;
+        }
         self.row > PLACES
     }
 }
@@ -79,9 +94,15 @@ impl Measurement {
     }
 
     /// Looks about the centre, then begins again with what was found there.
-    pub(super) fn doubt(&mut self, window: &Window<'_>, polar: &mut PolarTrack) {
+    pub(super) fn doubt(
+        &mut self,
+        window: &Window<'_>,
+        polar: &mut PolarTrack,
+        angular: &mut AngularSums,
+        even: &mut Even,
+    ) {
         let Some(doubt) = &mut self.doubt else { return };
-        if !doubt.step(window, polar) {
+        if !doubt.step(window, polar, angular, even) {
             return;
         }
         let (place, harmonic) = doubt.best;
@@ -91,6 +112,6 @@ impl Measurement {
             self.harmonic = harmonic.unsigned_abs();
         }
         self.turn = 0;
-        self.stage = Stage::Newton;
+        self.stage = Stage::Track;
     }
 }

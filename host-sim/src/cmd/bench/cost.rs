@@ -9,7 +9,9 @@ use std::process::ExitCode;
 
 use anyhow::Context as _;
 use evtach_core::{Event, Geometry};
-use evtach_host::device::{self, CallCost, INSTRUCTIONS_PER_TICK, Image, MemoryUse, Output, Pace};
+use evtach_host::device::{
+    self, CallCost, INSTRUCTIONS_PER_TICK, Image, MOST_IN_STEP, MemoryUse, Output, Pace,
+};
 use evtach_host::recording::{self, OpenOptions};
 use evtach_host::synth::{self, Rotor, Scene};
 
@@ -34,7 +36,7 @@ struct Played {
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     eprintln!("building the firmware");
     let image = device::build()?;
-    let mut memory = None;
+    let (mut memory, mut longest) = (None, 0);
     for played in recordings(&args.files)? {
         if let Some(path) = &args.keep {
             device::write_recording(path, played.geometry, &played.events)?;
@@ -42,12 +44,21 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         eprintln!("playing {} in QEMU", played.name);
         let output = device::run(&image, played.geometry, &played.events, Pace::File)?;
         print_run(&played, &output);
+        longest = longest.max(longest_step(&output));
         let live = device::run(&image, played.geometry, &played.events, Pace::Sensor)?;
         print_live(&played, &live);
         memory = Some(output.memory);
     }
     if let Some(memory) = memory {
         print_bytes(&image, &memory);
+    }
+    if longest > MOST_IN_STEP {
+        println!(
+            "a step took {} instructions, more than {}",
+            grouped(longest),
+            grouped(MOST_IN_STEP)
+        );
+        return Ok(ExitCode::FAILURE);
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -100,6 +111,7 @@ fn print_run(played: &Played, output: &Output) {
             grouped(instructions(*longest_ticks))
         );
     }
+    println!("  {:<24}{:>16} instructions", "longest step", grouped(longest_step(output)));
     print_readings(output);
     let all = instructions(output.push.ticks + output.stages.iter().map(|s| s.ticks).sum::<u64>());
     println!(
@@ -107,6 +119,10 @@ fn print_run(played: &Played, output: &Output) {
         "in all",
         all as f64 / duration_s / 1e6
     );
+}
+
+fn longest_step(output: &Output) -> u64 {
+    output.stages.iter().map(|stage| instructions(stage.longest_ticks)).max().unwrap_or(0)
 }
 
 /// What the first reading with a speed costs, and each after the first locked one.
