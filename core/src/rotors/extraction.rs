@@ -316,8 +316,8 @@ impl Extraction {
             return;
         }
         if self.quarter == 0 {
-            let capped = events > VISITS / 4 * 3;
-            let least_log2 = self.grid.cell_log2.saturating_sub(u8::from(capped)).max(2);
+            let crowded = events > VISITS / 4 * 3 || self.grid.cell_log2 == COARSEST_LOG2;
+            let least_log2 = self.grid.cell_log2.saturating_sub(u8::from(crowded)).max(2);
             let first = self.taken.is_empty();
             self.least_log2 = if first { least_log2 } else { least_log2.min(self.least_log2) };
         }
