@@ -9,17 +9,21 @@ mod conclude;
 mod gate;
 mod intake;
 mod job;
+mod work;
 
 use heapless::Vec;
 
 use crate::limits::{MAX_ROTORS, MAX_SUSPECTS};
-use crate::rotors::extraction::{self, Extraction};
+use crate::rotors::extraction::Extraction;
 use crate::rotors::{Found, HeatMap, Spectrum};
 use crate::settings::{Ignored, Memory, Settings};
-use crate::speed::measurement::{Bench, Measurement, Outcome};
+use crate::speed::measurement::{Measurement, Outcome};
 use crate::speed::polar::PolarTrack;
 use crate::store::{Store, WINDOW_SEGMENTS};
 use crate::tracker::Tracker;
+
+pub use work::Work;
+use work::Scratch;
 
 /// First window: short, so that a recording of a few milliseconds is spread over all segments; it doubles
 /// until the base window is reached.
@@ -48,14 +52,6 @@ struct Suspect {
     followed: Option<(Option<u8>, bool)>,
 }
 
-/// Memory that is used by one job at a time.
-#[derive(Debug)]
-#[expect(clippy::large_enum_variant, reason = "the larger one is the point: both share its memory")]
-enum Scratch {
-    Search(extraction::Scratch),
-    Measure(Bench),
-}
-
 /// Events in, readings out.
 #[derive(Debug)]
 pub struct Tachometer<'m> {
@@ -76,9 +72,9 @@ pub struct Tachometer<'m> {
     satisfied: bool,
     ignored: Ignored,
     job: Job,
-    polar: PolarTrack,
-    spectrum: Spectrum,
-    scratch: Scratch,
+    polar: &'m mut PolarTrack,
+    spectrum: &'m mut Spectrum,
+    scratch: &'m mut Scratch,
     candidates: Vec<Suspect, MAX_SUSPECTS>,
     outcomes: Vec<Outcome, MAX_ROTORS>,
     in_step_hz: Option<f32>,
@@ -92,6 +88,7 @@ impl<'m> Tachometer<'m> {
     #[must_use]
     pub fn new(settings: Settings, memory: Memory<'m>) -> Self {
         let heat = HeatMap::new(memory.heat, settings.geometry);
+        let Work { polar, spectrum, scratch } = memory.work;
         Self {
             settings,
             store: Store::new(memory.events, segment_us(FIRST_WINDOW_US)),
@@ -106,9 +103,9 @@ impl<'m> Tachometer<'m> {
             satisfied: false,
             ignored: Ignored::default(),
             job: Job::Idle,
-            polar: PolarTrack::new(),
-            spectrum: Spectrum::default(),
-            scratch: Scratch::Measure(Bench::EMPTY),
+            polar,
+            spectrum,
+            scratch,
             candidates: Vec::new(),
             outcomes: Vec::new(),
             in_step_hz: None,

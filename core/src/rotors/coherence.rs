@@ -61,8 +61,8 @@ impl Coherence {
         let mid_us = (window.duration_us / 2) as i32;
         let rate = TurnRate::from_rad_s(line_hz * TAU);
         let inside = |event: StoredEvent| {
-            let index = grid.index(event.x(), event.y());
-            (index < grid.len()).then_some(index)
+            let (x, y) = (event.x(), event.y());
+            grid.holds(x, y).then(|| grid.index(x, y))
         };
         even.step(window, usize::MAX, inside, |event, index| {
             let (sin, cos) = rate.after(event.since(window.start_us) - mid_us).sin_cos();

@@ -298,11 +298,14 @@ impl Extraction {
             return self.start_filling(scratch);
         };
         let filled = scratch.visits.fill(&view.window, &self.taken, filling);
-        let Some((events, company)) = filled else { return };
-        self.filling = None;
-        if events < LEAST_EVENTS {
+        let most_events = filling.most_events();
+        if filled.map(|(events, _)| events).or(most_events).is_some_and(|most| most < LEAST_EVENTS)
+        {
+            self.filling = None;
             return if self.quarter == 0 { self.end() } else { self.next_quarter() };
         }
+        let Some((events, company)) = filled else { return };
+        self.filling = None;
         self.lonely = company < LEAST_COMPANY && self.grid.cell_log2 < COARSEST_LOG2;
         if self.lonely && (self.quarter == 0 || company < HOPELESS_COMPANY) {
             self.grid = self.grid.coarser();

@@ -87,6 +87,15 @@ impl CellGrid {
         (1_u16 << self.cell_log2) as f32
     }
 
+    /// Whether a pixel lies on the grid: quicker than its cell.
+    #[must_use]
+    #[inline]
+    pub const fn holds(self, x: u16, y: u16) -> bool {
+        // Left of the edge or above it wraps to a large number.
+        (x.wrapping_sub(self.x0) as usize) < self.columns << self.cell_log2
+            && (y.wrapping_sub(self.y0) as usize) < self.rows << self.cell_log2
+    }
+
     /// The cell of a pixel; [`usize::MAX`] outside the grid.
     #[must_use]
     pub const fn index(self, x: u16, y: u16) -> usize {

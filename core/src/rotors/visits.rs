@@ -120,8 +120,8 @@ impl Visits {
             taken.iter().all(|disc| disc.distance2(&at) > disc.radius_px * disc.radius_px)
         };
         let inside = |event: StoredEvent| {
-            let cell = grid.index(event.x(), event.y());
-            (cell < VISIT_CELLS && free(event.x(), event.y())).then_some(cell)
+            let (x, y) = (event.x(), event.y());
+            (grid.holds(x, y) && free(x, y)).then(|| grid.index(x, y))
         };
         let Filling { even, counted, left } = filling;
         let take = |event: StoredEvent, cell: usize| {
@@ -129,7 +129,7 @@ impl Visits {
                 return;
             }
             *left -= 1;
-            let place = &mut self.ends[cell];
+            let Some(place) = self.ends.get_mut(cell) else { return };
             if *counted {
                 let tick = tick(event.since(start_us), self.window_us);
                 if let Some(time) = self.times.get_mut(usize::from(*place)) {
@@ -277,6 +277,14 @@ pub struct Filling {
     counted: bool,
     /// Events for which there is room.
     left: usize,
+}
+
+impl Filling {
+    /// The number of events that there are at most, once it is known.
+    #[must_use]
+    pub fn most_events(&self) -> Option<usize> {
+        self.even.is_weighed().then(|| self.even.count())
+    }
 }
 
 impl Default for Filling {
