@@ -363,6 +363,7 @@ fn smooth(grid: CellGrid, cells: &mut [u8], reach: usize) {
         let rows_above = reach.min(row) + 1;
         // Sums of the columns around the cell at hand, and of all of them.
         let (mut sums, mut oldest, mut around) = ([0; 2 * MOST_REACH + 1], 0, 0);
+        #[expect(clippy::needless_range_loop, reason = "the columns run on past the last cell")]
         for column in 0..columns + reach {
             let mut sum = 0;
             if column < columns {
