@@ -7,6 +7,7 @@ use crate::math::{TAU, sqrt};
 use crate::reading::{Reason, Status};
 use crate::speed::queue::stretch;
 use crate::store::Window;
+use crate::tachometer::BASE_WINDOW_US;
 
 /// A rotor keeps at least this share of its events in step, if they have no jitter.
 const LEAST_COHERENCE: f32 = 0.3;
@@ -41,6 +42,8 @@ const COARSE_SPREAD: f32 = 0.5;
 /// queue may stretch the window by, must fit into it.
 const MOST_ERROR: f32 = 0.01;
 const COARSE_SIGMAS: f32 = 3.0;
+/// The largest relative error where the stream ended before a window was full.
+const MOST_SHORT_SIGMA: f32 = 0.012;
 /// What a hand shakes, in pixels, and blocks of a turn from which on a single mark's axis is told from the mark.
 const SHAKE_PX: f32 = 3.0;
 const MARK_BLOCKS: usize = 4;
@@ -107,7 +110,7 @@ impl Measurement {
             0.0
         };
         match self.status {
-            Status::Coarse => self.widen_coarse(held_up / QUEUE_SIGMA),
+            Status::Coarse => self.widen_coarse(window, held_up / QUEUE_SIGMA),
             Status::Locked if self.pose.in_period() < MARK_BLOCKS => self.widen_mark(),
             _ => {}
         }
@@ -179,12 +182,16 @@ impl Measurement {
         }
     }
 
-    /// A coarse reading that may be farther off than any reading may be is none; `stretch` is the share by which the window may be
-    /// stretched.
-    fn widen_coarse(&mut self, stretch: f32) {
+    /// A coarse reading that may be farther off than any reading may be is none, as the next window will show more; but where the
+    /// stream ended before one was full, it is all there is. `stretch` is the share by which the window may be stretched.
+    fn widen_coarse(&mut self, window: &Window<'_>, stretch: f32) {
         self.widen_mark();
-        let room = (MOST_ERROR - stretch) * self.omega_rad_s.abs();
-        if COARSE_SIGMAS * self.estimate.sigma_rad_s > room {
+        let most = if window.duration_us < BASE_WINDOW_US {
+            MOST_SHORT_SIGMA
+        } else {
+            (MOST_ERROR - stretch) / COARSE_SIGMAS
+        };
+        if self.estimate.sigma_rad_s > most * self.omega_rad_s.abs() {
             self.status = Status::Refused(Reason::Ambiguous);
         }
     }
