@@ -50,6 +50,11 @@ impl Block {
         self.time_us / self.count.max(1.0)
     }
 
+    /// Number of events.
+    pub const fn count(&self) -> f32 {
+        self.count
+    }
+
     /// Share of the events in step.
     pub fn share(&self) -> f32 {
         self.in_step / self.count.max(1.0)
