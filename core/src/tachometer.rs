@@ -22,8 +22,8 @@ use crate::speed::polar::PolarTrack;
 use crate::store::{Store, WINDOW_SEGMENTS};
 use crate::tracker::Tracker;
 
-pub use work::Work;
 use work::Scratch;
+pub use work::Work;
 
 /// First window: short, so that a recording of a few milliseconds is spread over all segments; it doubles
 /// until the base window is reached.
@@ -34,7 +34,6 @@ pub const BASE_WINDOW_US: u32 = 150_000;
 pub const LONGEST_WINDOW_US: u32 = 2_000_000;
 
 #[derive(Debug, Default)]
-#[expect(clippy::large_enum_variant, reason = "no heap to box the larger one on")]
 enum Job {
     #[default]
     Idle,

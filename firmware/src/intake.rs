@@ -82,15 +82,17 @@ impl Block {
         self.filled = (self.filled + count).min(BLOCK_EVENTS);
     }
 
-    /// Keeps the events from the place `from` on for which `kept` holds, and returns how many went.
-    pub fn retain(&mut self, from: usize, mut kept: impl FnMut() -> bool) -> usize {
+    /// Keeps one in 2^`stride_log2` of the events from the place `from` on, and returns how many went. `phase` counts events
+    /// from block to block.
+    pub fn thin(&mut self, from: usize, stride_log2: u8, phase: &mut u32) -> usize {
         let before = self.filled;
         self.filled = from.min(before);
-        for index in self.filled..before {
-            if kept() {
-                self.places[self.filled] = self.places[index];
-                self.filled += 1;
-            }
+        let stride = 1 << stride_log2;
+        let first = self.filled + stride - 1 - (*phase as usize & (stride - 1));
+        *phase = phase.wrapping_add((before - self.filled) as u32);
+        for index in (first..before).step_by(stride) {
+            self.places[self.filled] = self.places[index];
+            self.filled += 1;
         }
         before - self.filled
     }

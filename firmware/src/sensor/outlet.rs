@@ -128,12 +128,7 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
                 events += count as u32;
                 let before = slot.events().len() - count;
                 if slot.weight_log2 > 0 {
-                    let mask = (1 << slot.weight_log2) - 1;
-                    let phase = &mut self.phase;
-                    let went = slot.retain(before, || {
-                        *phase = phase.wrapping_add(1);
-                        *phase & mask == 0
-                    });
+                    let went = slot.thin(before, slot.weight_log2, &mut self.phase);
                     self.delivered.thinned += went as u64;
                 }
                 if before == 0
@@ -188,10 +183,7 @@ fn halve(slot: &mut Block, phase: u32) -> usize {
     let last = phase >> slot.weight_log2;
     let mut index = last.wrapping_sub(slot.events().len() as u32);
     slot.weight_log2 += 1;
-    slot.retain(0, || {
-        index = index.wrapping_add(1);
-        index.is_multiple_of(2)
-    })
+    slot.thin(0, 1, &mut index)
 }
 
 #[cfg(test)]

@@ -4,6 +4,8 @@
 //! is the same whether it is drawn at once or region by region. Sizes and places are in pixels of the screen, y down.
 
 mod aim;
+#[cfg(test)]
+mod fonts;
 mod keys;
 mod list;
 mod number;
