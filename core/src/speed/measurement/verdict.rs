@@ -39,7 +39,7 @@ const COARSE_PHASE: f32 = 0.05;
 const COARSE_PHASE_SIGMA: f32 = 0.03;
 const COARSE_SPREAD: f32 = 0.5;
 /// No reading may be farther off than this, relative: so many standard errors of a coarse one, and all that a busy readout's
-/// queue may stretch the window by, must fit into it.
+/// queue may stretch the window by, must each fit into it.
 const MOST_ERROR: f32 = 0.01;
 const COARSE_SIGMAS: f32 = 3.0;
 /// The largest relative error where the stream ended before a window was full.
@@ -186,12 +186,10 @@ impl Measurement {
     /// stream ended before one was full, it is all there is. `stretch` is the share by which the window may be stretched.
     fn widen_coarse(&mut self, window: &Window<'_>, stretch: f32) {
         self.widen_mark();
-        let most = if window.duration_us < BASE_WINDOW_US {
-            MOST_SHORT_SIGMA
-        } else {
-            (MOST_ERROR - stretch) / COARSE_SIGMAS
-        };
-        if self.estimate.sigma_rad_s > most * self.omega_rad_s.abs() {
+        let short = window.duration_us < BASE_WINDOW_US;
+        let most = if short { MOST_SHORT_SIGMA } else { MOST_ERROR / COARSE_SIGMAS };
+        let stretched = stretch > MOST_ERROR && !short;
+        if stretched || self.estimate.sigma_rad_s > most * self.omega_rad_s.abs() {
             self.status = Status::Refused(Reason::Ambiguous);
         }
     }
