@@ -11,7 +11,9 @@ use embassy_time::{Duration, MockDriver, Timer};
 use embassy_usb_driver::Speed;
 use embassy_usb_host::BusState;
 use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
-use evtach_core::{Event, GyroSample, Memory, Reading, Settings, Status, StoredEvent, Tachometer, Work};
+use evtach_core::{
+    Event, GyroSample, Memory, Reading, Settings, Status, StoredEvent, Tachometer, Work,
+};
 use evtach_firmware::cost::{Costs, Spent};
 use evtach_firmware::intake::{BLOCKS, Block, Pace};
 use evtach_firmware::measure::{Companion, measure};

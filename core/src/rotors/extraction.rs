@@ -248,6 +248,8 @@ impl Extraction {
         self.in_step_hz
     }
 
+    // Not inlined: it is called in eight places.
+    #[inline(never)]
     fn end(&mut self) {
         if self.candidates.is_empty() && self.swept.is_none() {
             self.grid = CellGrid::default();
@@ -278,6 +280,8 @@ impl Extraction {
     }
 
     /// Enters a candidate; when the list is full, in place of the one that explains least.
+    // Nor this, in four.
+    #[inline(never)]
     fn enter(&mut self, candidate: Found) {
         if let Err(candidate) = self.candidates.push(candidate)
             && let Some(least) =

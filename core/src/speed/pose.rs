@@ -18,6 +18,7 @@ use heapless::Vec;
 
 use super::baseline::Estimate;
 use super::path::{Knot, Moving, Path};
+use super::polar::Annulus;
 use super::statistics::student_over_normal;
 use super::trend::{Point, Trend};
 use crate::limits::MAX_KNOTS;
@@ -243,8 +244,9 @@ impl Pose {
     /// template anew; `true` once all rounds are done. Cost: about 180 instructions an event.
     pub fn step(&mut self, window: &Window<'_>, sums: &mut Sums, even: &mut Even) -> bool {
         if !self.started {
-            let disc = Moving::new(self.disc, &self.path, window);
-            if even.weigh(window, |event| disc.place(event).is_some()) {
+            // The axis is thought to be at rest yet.
+            let annulus = Annulus::of(self.disc);
+            if even.weigh(window, |event| annulus.place(event).is_some()) {
                 self.started = true;
                 self.events = even.count();
                 self.even_share = even.share();

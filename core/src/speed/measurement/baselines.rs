@@ -44,6 +44,8 @@ impl Measurement {
         }
     }
 
+    // Not inlined: it is called in four places.
+    #[inline(never)]
     pub(super) fn plan(&mut self, window: &Window<'_>, periods: f32, effort: Effort) {
         let plan = Pairs::plan(self.pace(), periods, effort, self.events, window.duration_us);
         self.pairs = Some(plan);

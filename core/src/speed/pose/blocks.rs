@@ -73,6 +73,8 @@ impl Block {
     };
 
     /// Adds an event: how its direction changes with a shift, its phase off the template, and when it came.
+    // A function of its own: where it is called registers are scarce, and a fifth of the instructions would shuffle them.
+    #[inline(never)]
     pub fn add(
         &mut self,
         (x, y): (f32, f32),
