@@ -2,13 +2,14 @@
 //!
 //! [`Tachometer::push`] takes in events and never waits; [`Tachometer::poll`] advances the measurement of a full
 //! window in bounded steps. A reading is a function of the events of its window, their times and the capacities alone.
-//! Which windows are measured depends on speed only when a measurement takes longer than [`crate::store::SPARE_SEGMENTS`]
-//! segments: then events are left out and counted until it ends, and the next window starts afresh.
+//! Which windows are measured depends on speed only when a measurement takes longer than the spare segments last:
+//! then the oldest of these are given up, their events counted, and the next window begins with those that are left.
 
 mod conclude;
 mod gate;
 mod intake;
 mod job;
+mod rhythm;
 
 use heapless::Vec;
 
@@ -20,6 +21,7 @@ use crate::speed::measurement::{Bench, Measurement, Outcome};
 use crate::speed::polar::PolarTrack;
 use crate::store::{Store, WINDOW_SEGMENTS};
 use crate::tracker::Tracker;
+use rhythm::Rhythm;
 
 /// First window: short, so that a recording of a few milliseconds is spread over all segments; it doubles
 /// until the base window is reached.
@@ -52,6 +54,8 @@ struct Suspect {
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "the larger one is the point: both share its memory")]
 enum Scratch {
+    /// Nothing has been measured yet. Either of the others would be built on the stack first.
+    Unused,
     Search(extraction::Scratch),
     Measure(Bench),
 }
@@ -60,6 +64,7 @@ enum Scratch {
 #[derive(Debug)]
 pub struct Tachometer<'m> {
     settings: Settings,
+    rhythm: Rhythm,
     store: Store<'m>,
     heat: HeatMap<'m>,
     weights: &'m mut [u8],
@@ -70,7 +75,8 @@ pub struct Tachometer<'m> {
     window_segments: usize,
     /// End of the stored events when the measurement started: a last window may not be full.
     window_end_us: u64,
-    /// Whether the store has filled before the measurement ended.
+    /// Whether, while a window was measured, nothing came for longer than the spare segments last: what they hold does not go
+    /// on from the window, nor what comes from them.
     overrun: bool,
     /// Whether the last reading was a lock, so that the rest of a stream need not be looked at.
     satisfied: bool,
@@ -92,9 +98,11 @@ impl<'m> Tachometer<'m> {
     #[must_use]
     pub fn new(settings: Settings, memory: Memory<'m>) -> Self {
         let heat = HeatMap::new(memory.heat, settings.geometry);
+        let rhythm = Rhythm::of(memory.events.len());
         Self {
             settings,
-            store: Store::new(memory.events, segment_us(FIRST_WINDOW_US)),
+            rhythm,
+            store: Store::new(memory.events, rhythm.spare, segment_us(FIRST_WINDOW_US)),
             heat,
             weights: memory.weights,
             started: false,
@@ -108,7 +116,7 @@ impl<'m> Tachometer<'m> {
             job: Job::Idle,
             polar: PolarTrack::new(),
             spectrum: Spectrum::default(),
-            scratch: Scratch::Measure(Bench::EMPTY),
+            scratch: Scratch::Unused,
             candidates: Vec::new(),
             outcomes: Vec::new(),
             in_step_hz: None,
@@ -152,6 +160,12 @@ impl<'m> Tachometer<'m> {
     #[must_use]
     pub const fn heat(&self) -> &HeatMap<'m> {
         &self.heat
+    }
+
+    /// Whether a window is being measured: otherwise a poll does nothing.
+    #[must_use]
+    pub const fn is_measuring(&self) -> bool {
+        self.window_segments > 0
     }
 
     /// Name of the stage that the next poll works on.

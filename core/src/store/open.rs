@@ -48,37 +48,42 @@ impl Default for Segment {
 }
 
 impl Store<'_> {
-    /// Takes in events of the open segment.
+    /// Takes in events of the open segment; `kept` hears of those that it keeps, and of how many each stands for, as a
+    /// power of two.
     // A function of its own, so that all it needs stays in registers.
     #[inline(never)]
-    pub fn push(&mut self, events: &[PackedEvent]) {
+    pub fn push(&mut self, events: &[PackedEvent], mut kept: impl FnMut(PackedEvent, u8)) {
         let slot = self.slot(self.closed);
-        let mut rest = events;
-        let mut kept = 0;
-        loop {
-            let skip = self.segments[slot].skip as usize;
-            let Some((event, later)) = rest.get(skip..).and_then(<[_]>::split_first) else { break };
-            self.keep(slot, *event);
-            kept += 1;
-            rest = later;
+        let mut next = self.segments[slot].skip as usize;
+        let mut count = 0;
+        while next < events.len() {
+            if self.segments[slot].len >= self.segments[slot].until {
+                self.turn(slot);
+            }
+            let segment = &mut self.segments[slot];
+            let step_log2 = segment.step_log2;
+            let base = slot * self.capacity;
+            let places = self.events.get_mut(base + segment.len..base + segment.until);
+            let places = places.unwrap_or_default();
+            // As many as go by the same step.
+            let every = events[next..].iter().step_by(1 << step_log2);
+            let before = count;
+            for (place, event) in places.iter_mut().zip(every) {
+                *place = StoredEvent::store(*event, step_log2);
+                kept(*event, step_log2);
+                count += 1;
+            }
+            segment.len += count - before;
+            next += (count - before) << step_log2;
+            if count == before {
+                // No memory at all.
+                break;
+            }
         }
         let segment = &mut self.segments[slot];
-        segment.skip -= rest.len() as u32;
+        segment.skip = next.saturating_sub(events.len()) as u32;
         segment.counted += events.len() as u64;
-        self.thinned += (events.len() - kept) as u64;
-    }
-
-    #[inline(always)]
-    fn keep(&mut self, slot: usize, event: PackedEvent) {
-        if self.segments[slot].len >= self.segments[slot].until {
-            self.turn(slot);
-        }
-        let segment = &mut self.segments[slot];
-        if let Some(place) = self.events.get_mut(slot * self.capacity + segment.len) {
-            *place = StoredEvent::store(event, segment.step_log2);
-            segment.len += 1;
-        }
-        segment.skip = (1 << segment.step_log2) - 1;
+        self.thinned += (events.len() - count) as u64;
     }
 
     /// Chooses how many events the next ones stand for, and up to where; a full segment makes room first.
