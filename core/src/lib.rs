@@ -20,4 +20,4 @@ pub use event::{Event, Geometry, GyroSample, PackedEvent, Polarity};
 pub use reading::{Direction, Evidence, Frame, Reading, Reason, RotorReading, Speed, Status};
 pub use settings::{Ignored, Memory, Poll, Roi, Settings};
 pub use store::StoredEvent;
-pub use tachometer::Tachometer;
+pub use tachometer::{Tachometer, Work};

@@ -3,6 +3,7 @@
 use crate::event::Geometry;
 use crate::reading::Reading;
 use crate::store::StoredEvent;
+use crate::tachometer::Work;
 
 /// A rectangle of pixels; events outside are ignored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,6 +59,8 @@ pub struct Memory<'m> {
     pub heat: &'m mut [u16],
     /// Weights of the heat map's cells: as many.
     pub weights: &'m mut [u8],
+    /// What measuring works in.
+    pub work: &'m mut Work,
 }
 
 /// What [`crate::Tachometer::poll`] did.

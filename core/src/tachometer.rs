@@ -10,18 +10,22 @@ mod gate;
 mod intake;
 mod job;
 mod rhythm;
+mod work;
 
 use heapless::Vec;
 
 use crate::limits::{MAX_ROTORS, MAX_SUSPECTS};
-use crate::rotors::extraction::{self, Extraction};
+use crate::rotors::extraction::Extraction;
 use crate::rotors::{Found, HeatMap, Spectrum};
 use crate::settings::{Ignored, Memory, Settings};
-use crate::speed::measurement::{Bench, Measurement, Outcome};
+use crate::speed::measurement::{Measurement, Outcome};
 use crate::speed::polar::PolarTrack;
 use crate::store::{Store, WINDOW_SEGMENTS};
 use crate::tracker::Tracker;
 use rhythm::Rhythm;
+
+use work::Scratch;
+pub use work::Work;
 
 /// First window: short, so that a recording of a few milliseconds is spread over all segments; it doubles
 /// until the base window is reached.
@@ -50,16 +54,6 @@ struct Suspect {
     followed: Option<(Option<u8>, bool)>,
 }
 
-/// Memory that is used by one job at a time.
-#[derive(Debug)]
-#[expect(clippy::large_enum_variant, reason = "the larger one is the point: both share its memory")]
-enum Scratch {
-    /// Nothing has been measured yet. Either of the others would be built on the stack first.
-    Unused,
-    Search(extraction::Scratch),
-    Measure(Bench),
-}
-
 /// Events in, readings out.
 #[derive(Debug)]
 pub struct Tachometer<'m> {
@@ -82,9 +76,9 @@ pub struct Tachometer<'m> {
     satisfied: bool,
     ignored: Ignored,
     job: Job,
-    polar: PolarTrack,
-    spectrum: Spectrum,
-    scratch: Scratch,
+    polar: &'m mut PolarTrack,
+    spectrum: &'m mut Spectrum,
+    scratch: &'m mut Scratch,
     candidates: Vec<Suspect, MAX_SUSPECTS>,
     outcomes: Vec<Outcome, MAX_ROTORS>,
     in_step_hz: Option<f32>,
@@ -99,6 +93,7 @@ impl<'m> Tachometer<'m> {
     pub fn new(settings: Settings, memory: Memory<'m>) -> Self {
         let heat = HeatMap::new(memory.heat, settings.geometry);
         let rhythm = Rhythm::of(memory.events.len());
+        let Work { polar, spectrum, scratch } = memory.work;
         Self {
             settings,
             rhythm,
@@ -114,9 +109,9 @@ impl<'m> Tachometer<'m> {
             satisfied: false,
             ignored: Ignored::default(),
             job: Job::Idle,
-            polar: PolarTrack::new(),
-            spectrum: Spectrum::default(),
-            scratch: Scratch::Unused,
+            polar,
+            spectrum,
+            scratch,
             candidates: Vec::new(),
             outcomes: Vec::new(),
             in_step_hz: None,

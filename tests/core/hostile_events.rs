@@ -5,7 +5,7 @@
 
 use evtach_core::{
     Event, Geometry, GyroSample, Memory, Polarity, Poll, Reading, Roi, Settings, StoredEvent,
-    Tachometer,
+    Tachometer, Work,
 };
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -143,7 +143,9 @@ fn check(reading: &Reading) {
 fn play(settings: Settings, inputs: &[Input], store_events: usize, heat_cells: usize) {
     let mut events = vec![StoredEvent::default(); store_events];
     let (mut heat, mut weights) = (vec![0; heat_cells], vec![0; heat_cells]);
-    let memory = Memory { events: &mut events, heat: &mut heat, weights: &mut weights };
+    let mut work = Box::new(Work::EMPTY);
+    let memory =
+        Memory { events: &mut events, heat: &mut heat, weights: &mut weights, work: &mut work };
     let mut tachometer = Tachometer::new(settings, memory);
     let mut readings = Vec::new();
     for input in inputs {

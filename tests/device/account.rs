@@ -10,7 +10,7 @@ use embassy_sync::zerocopy_channel::{Channel, Receiver};
 use embedded_hal_async::spi::{ErrorType, Operation, SpiDevice};
 use evtach_core::Ignored;
 use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
-use evtach_core::{Event, Geometry, Memory, Polarity, Settings, StoredEvent, Tachometer};
+use evtach_core::{Event, Geometry, Memory, Polarity, Settings, StoredEvent, Tachometer, Work};
 use evtach_firmware::intake::{BLOCKS, Block, Pace};
 use evtach_firmware::record::Decoder;
 use evtach_firmware::sensor::spi::{Acquired, AlwaysReady, Bridge, Kind, Lost, SpiSensor, acquire};
@@ -141,7 +141,9 @@ async fn measure(mut blocks: Receiver<'_, NoopRawMutex, Block>) -> Measured {
     const BLOCKS_A_STEP: u64 = 16;
     let mut events = vec![StoredEvent::default(); DEVICE_EVENTS];
     let (mut heat, mut weights) = (vec![0; DEVICE_HEAT_CELLS], vec![0; DEVICE_HEAT_CELLS]);
-    let memory = Memory { events: &mut events, heat: &mut heat, weights: &mut weights };
+    let mut work = Box::new(Work::EMPTY);
+    let memory =
+        Memory { events: &mut events, heat: &mut heat, weights: &mut weights, work: &mut work };
     let mut tachometer = Tachometer::new(Settings::new(GEOMETRY), memory);
     let mut measured = Measured::default();
     for number in 1_u64.. {

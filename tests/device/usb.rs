@@ -11,7 +11,9 @@ use embassy_time::{Duration, MockDriver, Timer};
 use embassy_usb_driver::Speed;
 use embassy_usb_host::BusState;
 use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
-use evtach_core::{Event, GyroSample, Memory, Reading, Settings, Status, StoredEvent, Tachometer};
+use evtach_core::{
+    Event, GyroSample, Memory, Reading, Settings, Status, StoredEvent, Tachometer, Work,
+};
 use evtach_firmware::cost::{Costs, Spent};
 use evtach_firmware::intake::{BLOCKS, Block, Pace};
 use evtach_firmware::measure::{Companion, measure};
@@ -54,7 +56,9 @@ fn read_over_usb(model: Model, events: Vec<Event>) -> (Vec<Reading>, Acquired) {
     let (mut sender, mut receiver) = channel.split();
     let mut store = vec![StoredEvent::default(); DEVICE_EVENTS];
     let (mut heat, mut weights) = (vec![0; DEVICE_HEAT_CELLS], vec![0; DEVICE_HEAT_CELLS]);
-    let memory = Memory { events: &mut store, heat: &mut heat, weights: &mut weights };
+    let mut work = Box::new(Work::EMPTY);
+    let memory =
+        Memory { events: &mut store, heat: &mut heat, weights: &mut weights, work: &mut work };
     let mut tachometer = Tachometer::new(Settings::new(model.geometry()), memory);
     let mut readings = Readings::default();
     let mut acquired = Acquired::NONE;

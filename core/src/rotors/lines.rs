@@ -41,13 +41,10 @@ pub struct Spectrum {
     bins: [[f32; LAGS]; 2],
 }
 
-impl Default for Spectrum {
-    fn default() -> Self {
-        Self { bins: [[0.0; LAGS]; 2] }
-    }
-}
-
 impl Spectrum {
+    /// Nothing in it.
+    pub const EMPTY: Self = Self { bins: [[0.0; LAGS]; 2] };
+
     /// Starts over.
     pub fn clear(&mut self) {
         self.bins = [[0.0; LAGS]; 2];
@@ -132,7 +129,7 @@ mod tests {
 
     #[test]
     fn cells_visited_evenly_show_one_line_however_their_phases_lie() {
-        let mut spectrum = Spectrum::default();
+        let mut spectrum = Spectrum::EMPTY;
         // 100 cells with 15 visits each, 62 bins apart: time differences at the multiples of the period.
         for periods in 1..15_usize {
             spectrum.lags()[62 * periods] = 100.0 * (15 - periods) as f32 / 15.0;

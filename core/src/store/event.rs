@@ -12,6 +12,11 @@ pub struct StoredEvent {
     y_weight_polarity: u16,
 }
 
+impl StoredEvent {
+    /// What memory for events is filled with.
+    pub const EMPTY: Self = Self { t_us: 0, x: 0, y_weight_polarity: 0 };
+}
+
 const POLARITY_BIT: u16 = 0x8000;
 /// Rows fit 11 bits ([`crate::Geometry::MAX_PX`]); the four above hold the weight.
 const ROW_BITS: u16 = 11;

@@ -2,10 +2,10 @@
 
 use super::{Job, Scratch, Suspect, Tachometer};
 use crate::reading::{Reason, Status};
-use crate::rotors::extraction::{self, Extraction, View};
+use crate::rotors::extraction::{Extraction, View};
 use crate::rotors::{Disc, Visits};
 use crate::settings::Poll;
-use crate::speed::measurement::{Bench, Measurement, Outcome, Stated};
+use crate::speed::measurement::{Measurement, Outcome, Stated};
 
 impl Tachometer<'_> {
     /// Starts measuring the window over the oldest segments.
@@ -43,9 +43,7 @@ impl Tachometer<'_> {
     }
 
     fn search_by(&mut self, extraction: Extraction) {
-        if !matches!(self.scratch, Scratch::Search(_)) {
-            self.scratch = Scratch::Search(extraction::Scratch::default());
-        }
+        self.scratch.ready_for_search();
         self.job = Job::Search(extraction);
     }
 
@@ -71,8 +69,8 @@ impl Tachometer<'_> {
                 let grid = Visits::grid(self.settings.geometry, self.weights.len());
                 let Some(weights) = self.weights.get_mut(..grid.len()) else { return true };
                 let mut view = View { window, grid, weights };
-                let Scratch::Search(scratch) = &mut self.scratch else { return true };
-                if extraction.step(&mut view, &mut self.polar, &mut self.spectrum, scratch) {
+                let Scratch::Search(scratch) = self.scratch else { return true };
+                if extraction.step(&mut view, self.polar, self.spectrum, scratch) {
                     self.in_step_hz = extraction.in_step_hz();
                     for candidate in extraction.candidates() {
                         self.candidates.push(Suspect { found: *candidate, followed: None }).ok();
@@ -82,12 +80,12 @@ impl Tachometer<'_> {
                 false
             }
             Job::Measure(index, measurement) => {
-                let Scratch::Measure(bench) = &mut self.scratch else { return true };
+                let Scratch::Measure(bench) = self.scratch else { return true };
                 let stated = Stated {
                     blades: self.settings.blades,
                     clock_sigma_ppm: self.settings.clock_sigma_ppm,
                 };
-                if !measurement.step(&window, &stated, &mut self.polar, bench) {
+                if !measurement.step(&window, &stated, self.polar, bench) {
                     return false;
                 }
                 let (index, outcome) = (*index, measurement.result());
@@ -139,10 +137,7 @@ impl Tachometer<'_> {
             self.job = Job::Idle;
             return;
         };
-        match &mut self.scratch {
-            Scratch::Measure(bench) => bench.clear(),
-            Scratch::Unused | Scratch::Search(_) => self.scratch = Scratch::Measure(Bench::EMPTY),
-        }
+        self.scratch.ready_for_measuring();
         let Suspect { found, followed } = self.candidates[next];
         let measurement = match followed {
             Some((parts, alike)) => Measurement::follow(&found, parts, alike),

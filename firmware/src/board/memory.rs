@@ -3,7 +3,7 @@
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::zerocopy_channel::{Channel, Receiver, Sender};
 use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
-use evtach_core::{Geometry, Memory, Settings, StoredEvent, Tachometer};
+use evtach_core::{Geometry, Memory, Settings, StoredEvent, Tachometer, Work};
 use evtach_firmware::intake::{BLOCKS, Block};
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -14,15 +14,17 @@ static BUFFERS: ConstStaticCell<[Block; BLOCKS]> =
     ConstStaticCell::new([const { Block::EMPTY }; BLOCKS]);
 static CHANNEL: StaticCell<Channel<'_, Mutex, Block>> = StaticCell::new();
 /// The store, or, where nothing can be measured, what a board makes of it.
-pub static STORE: StaticCell<[StoredEvent; DEVICE_EVENTS]> = StaticCell::new();
+pub static STORE: ConstStaticCell<[StoredEvent; DEVICE_EVENTS]> =
+    ConstStaticCell::new([StoredEvent::EMPTY; DEVICE_EVENTS]);
 static HEAT: ConstStaticCell<[u16; DEVICE_HEAT_CELLS]> =
     ConstStaticCell::new([0; DEVICE_HEAT_CELLS]);
 static WEIGHTS: ConstStaticCell<[u8; DEVICE_HEAT_CELLS]> =
     ConstStaticCell::new([0; DEVICE_HEAT_CELLS]);
+static WORK: ConstStaticCell<Work> = ConstStaticCell::new(Work::EMPTY);
 static TACHOMETER: StaticCell<Tachometer<'_>> = StaticCell::new();
 
-/// Bytes of the tachometer.
-pub const TACHOMETER_BYTES: usize = size_of::<Tachometer<'_>>();
+/// Bytes of the tachometer, with what it works in.
+pub const TACHOMETER_BYTES: usize = size_of::<Tachometer<'_>>() + size_of::<Work>();
 
 /// Bytes of the event store.
 pub const STORE_BYTES: usize = size_of::<[StoredEvent; DEVICE_EVENTS]>();
@@ -43,8 +45,12 @@ const _: () = {
 /// back what its frame takes.
 #[inline(never)]
 pub fn tachometer() -> &'static mut Tachometer<'static> {
-    let events = STORE.init_with(|| [StoredEvent::default(); DEVICE_EVENTS]);
-    let memory = Memory { events, heat: HEAT.take(), weights: WEIGHTS.take() };
+    let memory = Memory {
+        events: STORE.take(),
+        heat: HEAT.take(),
+        weights: WEIGHTS.take(),
+        work: WORK.take(),
+    };
     // The first block tells the sensor's size, and the tachometer is set to it.
     let size = Geometry { width_px: 320, height_px: 320 };
     TACHOMETER.init_with(|| Tachometer::new(Settings::new(size), memory))

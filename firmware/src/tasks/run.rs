@@ -52,7 +52,7 @@ pub async fn show<R: Recording, P: Panel>(
             hung(task);
         }
         feed();
-        select(ticker.next(), shared.touched.wait()).await;
+        select(ticker.next(), shared.touched.receive()).await;
     }
 }
 

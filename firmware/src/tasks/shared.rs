@@ -6,7 +6,6 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
-use embassy_sync::signal::Signal;
 use evtach_core::{Reading, Roi};
 
 use crate::instrument::Picture;
@@ -58,13 +57,14 @@ pub struct Shared {
     standing: Mutex<CriticalSectionRawMutex, Cell<Standing>>,
     pub(super) readings: Channel<CriticalSectionRawMutex, Reading, READINGS>,
     pub(super) dropped: AtomicU32,
-    /// The last that was asked for. No `Signal`: that is not all zeros at the start, and would have the flash hold a copy of all this.
+    /// The last that was asked for. No `Signal`, here nor below: that is not all zeros at the start, and would have the flash hold a
+    /// copy of all this.
     wanted: Channel<CriticalSectionRawMutex, Wanted, 1>,
     /// A picture to be taken, and one that has been.
     pub(super) blank: Channel<CriticalSectionRawMutex, &'static mut Picture, 1>,
     pub(super) taken: Channel<CriticalSectionRawMutex, &'static mut Picture, 1>,
     /// A person has asked for something, and wants to see it.
-    pub(super) touched: Signal<CriticalSectionRawMutex, ()>,
+    pub(super) touched: Channel<CriticalSectionRawMutex, (), 1>,
     alive: AtomicU32,
 }
 
@@ -85,7 +85,7 @@ impl Shared {
             wanted: Channel::new(),
             blank: Channel::new(),
             taken: Channel::new(),
-            touched: Signal::new(),
+            touched: Channel::new(),
             alive: AtomicU32::new(0),
         }
     }

@@ -68,7 +68,9 @@ pub fn write<D: DrawTarget<Color = Rgb565>>(
 ) -> Result<(), D::Error> {
     let mut digits = String::<12>::new();
     write!(digits, "{number}").ok();
-    let (said, filled) = digits.split_at(digits.len().saturating_sub(number.filled()));
+    // What may panic for a text prints it: 5 KB of flash.
+    let said = digits.len().saturating_sub(number.filled());
+    let (said, filled) = digits.split_at_checked(said).unwrap_or((&digits, ""));
     let faint = Ink { colour: FAINT, ..ink };
     text::draw(target, font, filled, right, Align::Right, faint)?;
     let right = right - Point::new(width(font, filled), 0);

@@ -1,22 +1,86 @@
-//! Lettering: M+ FONTS by Coji Morishita (SIL Open Font License), rasterised at compile time to four grey levels.
+//! Lettering: fonts that the build script has packed, and how a line of text is set in them.
 
-use embedded_graphics::pixelcolor::{Gray2, Rgb565};
+use core::iter;
+
+use embedded_graphics::pixelcolor::Rgb565;
 use embedded_graphics::prelude::*;
-use mplusfonts::color::{Colormap, Linear as _};
-use mplusfonts::image::Colors as _;
-use mplusfonts::{BitmapFont, mplus};
+use embedded_graphics::primitives::Rectangle;
 
 /// A font with the characters that the screen uses.
-pub type Font = BitmapFont<'static, Gray2, 1>;
+pub struct Font {
+    /// The first and the last of the characters that follow each other.
+    row: (char, char),
+    /// And others.
+    others: &'static str,
+    /// In this order.
+    glyphs: &'static [Glyph],
+    /// The pixels of all of them: runs of a level, four bits each. See `build/fonts.rs`.
+    runs: &'static [u8],
+}
 
-/// Labels: capitals of 11 px.
-pub static SMALL: Font = mplus!(1, 500, 15, true, 1, 2, ' '..='~', ["±", "×", "÷", "·", "–"]);
+/// A letter.
+struct Glyph {
+    /// From it to the next one.
+    advance_px: f32,
+    /// Where its pixels begin in the font's.
+    at: u16,
+    /// Its corner, from the point where it stands on the baseline.
+    x: i8,
+    y: i8,
+    width: u8,
+    height: u8,
+}
 
-/// Values: capitals of 16 px.
-pub static MEDIUM: Font = mplus!(1, 600, 22, true, 1, 2, ' '..='~', ["±", "×", "÷", "·", "–"]);
+include!(concat!(env!("OUT_DIR"), "/fonts.rs"));
 
-/// The number: digits of 73 px, all equally wide.
-pub static HUGE: Font = mplus!(1, 600, 100, true, 1, 2, '0'..='9', [".", "-"]);
+impl Glyph {
+    /// What stands for a character that the font does not have.
+    const NONE: Self = Self { advance_px: 0.0, at: 0, x: 0, y: 0, width: 0, height: 0 };
+}
+
+impl Font {
+    fn glyph(&self, letter: char) -> &Glyph {
+        let (first, last) = self.row;
+        let index = if (first..=last).contains(&letter) {
+            letter as usize - first as usize
+        } else {
+            let others = last as usize - first as usize + 1;
+            match self.others.chars().position(|other| other == letter) {
+                Some(index) => others + index,
+                None => return &Glyph::NONE,
+            }
+        };
+        self.glyphs.get(index).unwrap_or(&Glyph::NONE)
+    }
+
+    /// The letters of a text with how far each is from the start.
+    fn set<'t>(&self, text: &'t str) -> impl Iterator<Item = (f32, &Glyph)> + use<'_, 't> {
+        text.chars().scan(0.0, |x, letter| {
+            let glyph = self.glyph(letter);
+            let at = *x;
+            *x += glyph.advance_px;
+            Some((at, glyph))
+        })
+    }
+
+    /// The runs of one level of a glyph's pixels, row by row: the level, 0 to 3, and the length.
+    fn runs(&self, glyph: &Glyph) -> impl Iterator<Item = (u8, i32)> + use<'_> {
+        let packed = self.runs.get(usize::from(glyph.at)..).unwrap_or_default();
+        let mut nibbles = packed.iter().flat_map(|pair| [pair >> 4, pair & 15]);
+        iter::from_fn(move || {
+            let head = nibbles.next()?;
+            let mut length = i32::from(head & 3) + 1;
+            while length >= 4 {
+                let more = nibbles.next()?;
+                length += i32::from(more);
+                if more < 15 {
+                    break;
+                }
+            }
+            Some((head >> 2, length))
+        })
+    }
+}
 
 /// Where a text stands relative to its point, which is on the baseline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,12 +102,24 @@ pub struct Ink {
     pub paper: Rgb565,
 }
 
+impl Ink {
+    /// The colour of a level, 0 to 3: paper, ink, and two between.
+    fn level(self, level: u8) -> Rgb565 {
+        let mix = |paper: u8, ink: u8| {
+            let (paper, ink) = (i32::from(paper), i32::from(ink));
+            // To the nearest.
+            ((6 * paper + 2 * (ink - paper) * i32::from(level) + 3) / 6) as u8
+        };
+        let Self { colour, paper } = self;
+        let red = mix(paper.r(), colour.r());
+        Rgb565::new(red, mix(paper.g(), colour.g()), mix(paper.b(), colour.b()))
+    }
+}
+
 /// Width of a text in pixels.
 #[must_use]
 pub fn width(font: &Font, text: &str) -> i32 {
-    let mut glyphs = Glyphs::new(font, text);
-    while glyphs.next().is_some() {}
-    glyphs.x as i32
+    font.set(text).fold(0.0, |_, (x, glyph)| x + glyph.advance_px) as i32
 }
 
 /// Draws one line of text. Characters that the font does not have leave nothing.
@@ -64,48 +140,29 @@ pub fn draw<D: DrawTarget<Color = Rgb565>>(
         Align::Centre => at.x - width(font, text) / 2,
         Align::Right => at.x - width(font, text),
     };
-    let colours: Colormap<Rgb565, 4> = Colormap::linear(ink.paper, ink.colour);
-    let paper = Gray2::new(0);
-    for (x, entry) in Glyphs::new(font, text) {
-        let image = entry.glyph.images.get(0).mul_offset(1, -1).add_offset(left + x, at.y);
-        let levels = image.colors().into_iter();
-        // Only the ink: boxes of neighbours may overlap.
-        let pixels = image.bounding_box().points().zip(levels);
-        let inked = pixels.filter(|(_, level)| *level != paper);
-        target.draw_iter(inked.map(|(point, level)| Pixel(point, colours.get(level))))?;
+    let colours = [0, 1, 2, 3].map(|level| ink.level(level));
+    for (x, glyph) in font.set(text) {
+        let corner = Point::new(left + x as i32 + i32::from(glyph.x), at.y + i32::from(glyph.y));
+        let (width, height) = (i32::from(glyph.width), i32::from(glyph.height));
+        let mut place = Point::zero();
+        for (level, mut length) in font.runs(glyph) {
+            while length > 0 && place.y < height {
+                let here = length.min(width - place.x);
+                // Only the ink: boxes of neighbours may overlap.
+                if level > 0 {
+                    let run = Rectangle::new(corner + place, Size::new(here as u32, 1));
+                    target.fill_solid(&run, colours[usize::from(level)])?;
+                }
+                length -= here;
+                place.x += here;
+                if place.x == width {
+                    place = Point::new(0, place.y + 1);
+                }
+            }
+            if place.y == height {
+                break;
+            }
+        }
     }
     Ok(())
-}
-
-/// The characters of a text with their places.
-struct Glyphs<'t> {
-    font: &'t Font,
-    rest: &'t str,
-    before: Option<&'t Entry>,
-    x: f32,
-}
-
-type Entry = mplusfonts::CharmapEntry<'static, Gray2, 1>;
-
-impl<'t> Glyphs<'t> {
-    const fn new(font: &'t Font, text: &'t str) -> Self {
-        Self { font, rest: text, before: None, x: 0.0 }
-    }
-}
-
-impl<'t> Iterator for Glyphs<'t> {
-    type Item = (i32, &'t Entry);
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let entry = self.font.charmap.get(self.rest);
-        let key = if self.rest.is_empty() { "" } else { entry.key };
-        if let Some(before) = self.before.take() {
-            self.x += (before.advance_width_to)(key);
-        }
-        let mut chars = self.rest.chars();
-        chars.next()?;
-        self.rest = chars.as_str();
-        self.before = Some(entry);
-        Some((self.x as i32, entry))
-    }
 }

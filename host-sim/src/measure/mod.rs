@@ -7,7 +7,9 @@ mod table;
 
 use evtach_core::Ignored;
 use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
-use evtach_core::{Event, GyroSample, Memory, Poll, Reading, Settings, StoredEvent, Tachometer};
+use evtach_core::{
+    Event, GyroSample, Memory, Poll, Reading, Settings, StoredEvent, Tachometer, Work,
+};
 
 pub use json::{Document, FileFacts, ReadingRow, RotorRow, letter};
 pub use summary::{Summary, summarise};
@@ -63,7 +65,9 @@ pub fn with_tachometer<R>(
     let mut events = vec![StoredEvent::default(); capacity.events()];
     let mut heat = vec![0_u16; capacity.heat_cells()];
     let mut weights = vec![0_u8; capacity.heat_cells()];
-    let memory = Memory { events: &mut events, heat: &mut heat, weights: &mut weights };
+    let mut bench = Box::new(Work::EMPTY);
+    let memory =
+        Memory { events: &mut events, heat: &mut heat, weights: &mut weights, work: &mut bench };
     work(&mut Tachometer::new(settings, memory))
 }
 

@@ -37,6 +37,9 @@ mod tape;
 #[cfg(target_os = "none")]
 mod timers;
 #[cfg(target_os = "none")]
+#[path = "../trap.rs"]
+mod trap;
+#[cfg(target_os = "none")]
 mod uart;
 #[cfg(target_os = "none")]
 mod usage;

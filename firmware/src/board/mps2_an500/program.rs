@@ -135,7 +135,7 @@ pub async fn front_task(parts: Parts) {
     let Parts { front, mut store, preferences, injection } = parts;
     let mut port = Uart::start();
     watchdog::start();
-    let hung = |task: Task| fault::stop(Fault::Watchdog, task.as_str());
+    let hung = |task: Task| fault::stop(Fault::Watchdog, &task.as_str());
     let showing = tasks::show(front, &SHARED, watchdog::feed, hung);
     let answering = tasks::link(front, &SHARED, &mut port);
     let saving = tasks::save(front, &mut store, preferences);

@@ -16,6 +16,7 @@ use evtach_firmware::settings::MemoryFlash;
 use evtach_firmware::tasks;
 
 use crate::tape::RecordingMemory;
+use crate::trap;
 
 /// Where it lies, and what is in it.
 const START: usize = 0x6000_0000;
@@ -128,16 +129,16 @@ impl tasks::Panel for Panel {
     }
 }
 
-/// The block of the last fault, by value: it may be written by a handler at any time.
+/// The block of the last fault.
 pub fn read_kept() -> [u8; KEPT_BYTES] {
     // SAFETY: the memory is there, holds bytes, and nothing refers to it.
-    unsafe { ptr::with_exposed_provenance::<[u8; KEPT_BYTES]>(KEPT).read_volatile() }
+    unsafe { trap::read_kept(ptr::with_exposed_provenance(KEPT)) }
 }
 
 /// Writes the block of the last fault.
-pub fn write_kept(block: [u8; KEPT_BYTES]) {
+pub fn write_kept(block: &[u8; KEPT_BYTES]) {
     // SAFETY: as above.
-    unsafe { ptr::with_exposed_provenance_mut::<[u8; KEPT_BYTES]>(KEPT).write_volatile(block) }
+    unsafe { trap::write_kept(ptr::with_exposed_provenance_mut(KEPT), block) }
 }
 
 /// Room for one thing.

@@ -30,7 +30,7 @@ static MEASURE: InterruptExecutor = InterruptExecutor::new();
 #[entry]
 fn main() -> ! {
     let Some(mut core) = cortex_m::Peripherals::take() else {
-        fault::stop(Fault::Panic, "the peripherals are taken");
+        fault::stop(Fault::Panic, &"the peripherals are taken");
     };
     cache::start(&mut core.MPU, &mut core.SCB, &mut core.CPUID);
     let source = clock::start_crystal();
@@ -38,7 +38,7 @@ fn main() -> ! {
     defmt::info!("EV-Tach {=str}", env!("CARGO_PKG_VERSION"));
     let started = start(board, source, &mut core.SCB, &mut core.CPUID);
     if let Err(error) = started {
-        fault::stop(Fault::Panic, format_args!("a task is there twice: {error:?}"));
+        fault::stop(Fault::Panic, &format_args!("a task is there twice: {error:?}"));
     }
     loop {
         cortex_m::asm::wfi();
@@ -59,11 +59,11 @@ fn start(
             display::start(board.display, frames.address(), None);
             (Panel::Frames(frames), None)
         }
-        Ok(None) => fault::stop(Fault::Panic, "the SDRAM is taken"),
+        Ok(None) => fault::stop(Fault::Panic, &"the SDRAM is taken"),
         Err(error) => {
             scb.disable_dcache(cpuid);
             let spare = spare::take();
-            display::start(board.display, spare.address(), Some(&spare::COLOURS));
+            display::start(board.display, spare.address(), Some(&spare::colours()));
             (Panel::Spare(spare), Some(KeptFault::new(Fault::Memory, error)))
         }
     };

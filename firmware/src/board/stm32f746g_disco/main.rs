@@ -40,6 +40,9 @@ mod stack;
 #[path = "../tape.rs"]
 mod tape;
 #[cfg(target_os = "none")]
+#[path = "../trap.rs"]
+mod trap;
+#[cfg(target_os = "none")]
 mod watchdog;
 #[cfg(target_os = "none")]
 mod wiring;

@@ -127,7 +127,7 @@ async fn live(
     let front = front(parts.panel, preferences, kept.or(damaged));
     let (mut device, mut port) = port::start(parts.port, uid_hex());
     let feed = watchdog::start(parts.watchdog);
-    let hung = |task: Task| fault::stop(Fault::Watchdog, task.as_str());
+    let hung = |task: Task| fault::stop(Fault::Watchdog, &task.as_str());
     let showing = pin!(tasks::show(front, &SHARED, feed, hung));
     let answering = pin!(tasks::link(front, &SHARED, &mut port));
     let saving = pin!(tasks::save(front, &mut store, preferences));

@@ -16,27 +16,23 @@ const PIXELS: usize = WIDTH * HEIGHT;
 const _: () = assert!(PIXELS <= STORE_BYTES);
 
 /// The colours of the pixels: three bits of red, three of green, two of blue.
-pub const COLOURS: [ltdc::RgbColor; 256] = {
-    let mut colours = [ltdc::RgbColor { red: 0, green: 0, blue: 0 }; 256];
-    let mut code = 0;
-    while code < 256 {
+pub fn colours() -> [ltdc::RgbColor; 256] {
+    core::array::from_fn(|code| {
         let (red, green, blue) = (code >> 5, code >> 2 & 7, code & 3);
-        colours[code] = ltdc::RgbColor {
+        ltdc::RgbColor {
             red: (red * 255 / 7) as u8,
             green: (green * 255 / 7) as u8,
             blue: (blue * 255 / 3) as u8,
-        };
-        code += 1;
-    }
-    colours
-};
+        }
+    })
+}
 
 /// The pixels.
 pub struct Spare(&'static mut [u8; PIXELS]);
 
 /// Takes the memory of the events. The data cache must be off: the display does not see what is in it.
 pub fn take() -> Spare {
-    let store = core::ptr::from_mut(STORE.uninit()).cast::<MaybeUninit<[u8; PIXELS]>>();
+    let store = core::ptr::from_mut(STORE.take()).cast::<MaybeUninit<[u8; PIXELS]>>();
     // SAFETY: the memory is as large (see above), has no other name any more, and zeros are pixels.
     unsafe {
         store.write_bytes(0, 1);

@@ -11,8 +11,11 @@ use super::registers::Register;
 pub const TROUBLE_BYTES: usize = 72;
 
 /// Why there is no camera at the port, in words for the screen: what is, and what to do.
+///
+/// Numbered from one, so that none of them is zeros: what begins without any then is, and takes no flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[repr(u8)]
 pub enum Trouble {
     /// Some other device, by the numbers of its maker and its kind.
     Foreign {
@@ -20,7 +23,7 @@ pub enum Trouble {
         vendor_id: u16,
         /// Kind.
         product_id: u16,
-    },
+    } = 1,
     /// The firmware of the camera's USB controller is too old.
     OldFirmware {
         /// The camera.
