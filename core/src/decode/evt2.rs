@@ -47,6 +47,8 @@ impl Evt2 {
     }
 
     /// Takes in as many words as there are places, and packs their events. Returns the number of words and of events.
+    // Not inlined: what calls it is built for size.
+    #[inline(never)]
     pub fn pack(&mut self, words: &[[u8; 4]], places: &mut [PackedEvent]) -> (usize, usize) {
         let words = &words[..words.len().min(places.len())];
         let (mut taken, mut filled) = (0, 0);

@@ -32,7 +32,6 @@ impl Default for Work {
 
 /// Memory that is used by one job at a time.
 #[derive(Debug)]
-#[expect(clippy::large_enum_variant, reason = "the larger one is the point: both share its memory")]
 pub(super) enum Scratch {
     Measure(Bench),
     Search(extraction::Scratch),
