@@ -14,6 +14,7 @@ mod open;
 mod window;
 
 pub use even::Even;
+pub(crate) use event::MOST_WEIGHT_LOG2;
 pub use event::StoredEvent;
 pub use window::{Account, Window};
 

@@ -34,7 +34,6 @@ pub const BASE_WINDOW_US: u32 = 150_000;
 pub const LONGEST_WINDOW_US: u32 = 2_000_000;
 
 #[derive(Debug, Default)]
-#[expect(clippy::large_enum_variant, reason = "no heap to box the larger one on")]
 enum Job {
     #[default]
     Idle,

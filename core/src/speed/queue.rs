@@ -79,7 +79,7 @@ mod tests {
             while t_us >= store.open_end_us() {
                 store.close_segment();
             }
-            store.push(&[PackedEvent::new(t_us as u32, 1, 1, Polarity::On)]);
+            store.push(&[PackedEvent::new(t_us as u32, 1, 1, Polarity::On)], 0);
         }
         stretch(&store.window(6, u64::MAX))
     }

@@ -48,34 +48,35 @@ impl Default for Segment {
 }
 
 impl Store<'_> {
-    /// Takes in events of the open segment.
+    /// Takes in events of the open segment, each of which stands for 2^`weight_log2`: the others were thinned before.
     // A function of its own, so that all it needs stays in registers.
     #[inline(never)]
-    pub fn push(&mut self, events: &[PackedEvent]) {
+    pub fn push(&mut self, events: &[PackedEvent], weight_log2: u8) {
         let slot = self.slot(self.closed);
         let mut rest = events;
-        let mut kept = 0;
+        let mut kept = 0_u64;
         loop {
-            let skip = self.segments[slot].skip as usize;
+            let skip = (self.segments[slot].skip >> weight_log2) as usize;
             let Some((event, later)) = rest.get(skip..).and_then(<[_]>::split_first) else { break };
-            self.keep(slot, *event);
+            self.keep(slot, *event, weight_log2);
             kept += 1;
             rest = later;
         }
         let segment = &mut self.segments[slot];
-        segment.skip -= rest.len() as u32;
-        segment.counted += events.len() as u64;
-        self.thinned += (events.len() - kept) as u64;
+        segment.skip -= (rest.len() as u32) << weight_log2;
+        let arrived = (events.len() as u64) << weight_log2;
+        segment.counted += arrived;
+        self.thinned += arrived - kept;
     }
 
     #[inline(always)]
-    fn keep(&mut self, slot: usize, event: PackedEvent) {
+    fn keep(&mut self, slot: usize, event: PackedEvent, weight_log2: u8) {
         if self.segments[slot].len >= self.segments[slot].until {
             self.turn(slot);
         }
         let segment = &mut self.segments[slot];
         if let Some(place) = self.events.get_mut(slot * self.capacity + segment.len) {
-            *place = StoredEvent::store(event, segment.step_log2);
+            *place = StoredEvent::store(event, segment.step_log2.max(weight_log2));
             segment.len += 1;
         }
         segment.skip = (1 << segment.step_log2) - 1;
@@ -87,15 +88,15 @@ impl Store<'_> {
         let (base, burst, octave) = (slot * self.capacity, self.burst(), self.capacity / 16);
         let segment = &mut self.segments[slot];
         if segment.len == self.capacity {
-            // Halve the reservoir: every other event goes, those kept stay evenly spread.
             let reservoir = &mut self.events[base + burst..base + self.capacity];
-            let kept = reservoir.len() / 2;
+            let mut kept = reservoir.len();
+            while kept == reservoir.len() && segment.stride_log2 < MOST_WEIGHT_LOG2 {
+                segment.stride_log2 += 1;
+                kept = thin(reservoir, segment.stride_log2);
+            }
+            kept = kept.min(reservoir.len().saturating_sub(1));
             self.thinned += (reservoir.len() - kept) as u64;
             segment.len = burst + kept;
-            segment.stride_log2 = (segment.stride_log2 + 1).min(MOST_WEIGHT_LOG2);
-            for i in 0..kept {
-                reservoir[i] = reservoir[2 * i].weighing(segment.stride_log2);
-            }
         }
         let part = segment.len.checked_div(octave).unwrap_or(0);
         (segment.step_log2, segment.until) = if octave == 0 {
@@ -113,4 +114,21 @@ impl Store<'_> {
     pub(super) const fn burst(&self) -> usize {
         BURST_SIXTEENTHS * (self.capacity / 16)
     }
+}
+
+/// Thins events until each stands for 2^`weight_log2` or, where it already does, for more; returns how many are left. Those that are
+/// stay evenly spread: every other one of events that all stand for half as many.
+fn thin(events: &mut [StoredEvent], weight_log2: u8) -> usize {
+    let (mut passed, mut kept, mask) = (0_u32, 0, (1_u32 << weight_log2) - 1);
+    for index in 0..events.len() {
+        let event = events[index];
+        let after = passed + (1 << event.weight_log2());
+        // The first of each stretch of so many.
+        if (passed + mask) & !mask < after {
+            events[kept] = event.weighing(weight_log2.max(event.weight_log2()));
+            kept += 1;
+        }
+        passed = after;
+    }
+    kept
 }

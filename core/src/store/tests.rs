@@ -10,7 +10,7 @@ fn fill(store: &mut Store<'_>, times: impl Iterator<Item = u64>) {
         while t_us >= store.open_end_us() {
             store.close_segment();
         }
-        store.push(&[PackedEvent::pack(&event(t_us))]);
+        store.push(&[PackedEvent::pack(&event(t_us))], 0);
     }
 }
 
@@ -46,6 +46,37 @@ fn even_events_stand_for_the_same_number_each() {
     assert!(gaps.iter().all(|gap| (1..=1_536).contains(gap)), "{gaps:?}");
     let first_half = kept.iter().filter(|t_us| **t_us < 30_000).count();
     assert!(first_half.abs_diff(kept.len() - first_half) <= 2);
+}
+
+#[test]
+fn events_that_were_thinned_before_stand_for_those_left_out() {
+    let mut memory = [StoredEvent::default(); 64 * SEGMENTS];
+    let mut store = Store::new(&mut memory, 10_000);
+    // A stretch of 15 ms in which one in 8 comes, then one in 512: more than the reservoir leaves out by itself.
+    let weight_log2 = |t_us: u64| match t_us {
+        20_000..30_000 => 3,
+        30_000..35_000 => 9,
+        _ => 0,
+    };
+    for t_us in (0..60_000_u64).filter(|t_us| t_us.trailing_zeros() >= weight_log2(*t_us)) {
+        while t_us >= store.open_end_us() {
+            store.close_segment();
+        }
+        store.push(&[PackedEvent::pack(&event(t_us))], weight_log2(t_us) as u8);
+    }
+    let account = store.account(6);
+    assert!(account.counted.abs_diff(60_000) < 512, "{account:?}");
+    assert_eq!(store.thinned(), account.counted - account.kept);
+    let window = store.window(6, u64::MAX);
+    let stored: u64 = window.events().map(|event| 1 << event.weight_log2()).sum();
+    assert!(stored.abs_diff(60_000) < 6_000, "{stored}");
+    let (mut even, mut times) = (Even::default(), Vec::new());
+    let since = |event: StoredEvent| Some(event.since(0));
+    while !even.step(&window, 100, since, |_, t_us| times.push(t_us)) {}
+    let gaps: Vec<i32> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    assert!(gaps.iter().all(|gap| (1..=1_536).contains(gap)), "{gaps:?}");
+    let thinned = times.iter().filter(|t_us| (20_000..35_000).contains(*t_us)).count();
+    assert!(thinned.abs_diff(times.len() / 4) <= 3, "{thinned} of {}", times.len());
 }
 
 #[test]

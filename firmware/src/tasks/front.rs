@@ -108,6 +108,21 @@ impl<R: Recording, P: Panel> Front<R, P> {
         self.panel.present();
     }
 
+    /// Looks at what is to be drawn, for [`draw_next`](Self::draw_next).
+    pub(super) fn look(&self, screen: &mut Screen) {
+        screen.look(&self.instrument);
+    }
+
+    /// Draws one part of what has changed; shows it all and says so when there is none left.
+    pub(super) fn draw_next(&mut self, screen: &mut Screen) -> bool {
+        // A panel that fails is drawn whole the next time.
+        let more = screen.draw_next(&mut self.panel, &self.instrument).unwrap_or(false);
+        if !more {
+            self.panel.present();
+        }
+        more
+    }
+
     /// Takes in what has come from the other tasks.
     pub fn refresh(&mut self) {
         let standing = self.shared.standing();
@@ -121,7 +136,7 @@ impl<R: Recording, P: Panel> Front<R, P> {
         let since = now.saturating_duration_since(self.reached.1);
         self.instrument.tick(
             self.reached.0.saturating_add(since.as_micros()),
-            Traffic { events: standing.received, lost: standing.lost },
+            Traffic { events: standing.received, lost: standing.lost() },
         );
         while let Ok(reading) = self.shared.readings.try_receive() {
             self.instrument.take_in(reading);
