@@ -39,7 +39,7 @@ const COARSE_PHASE: f32 = 0.05;
 const COARSE_PHASE_SIGMA: f32 = 0.03;
 const COARSE_SPREAD: f32 = 0.5;
 /// No reading may be farther off than this, relative: so many standard errors of a coarse one, and all that a busy readout's
-/// queue may stretch the window by, must fit into it.
+/// queue may stretch the window by, must each fit into it.
 const MOST_ERROR: f32 = 0.01;
 const COARSE_SIGMAS: f32 = 3.0;
 /// The largest relative error where the stream ended before a window was full.
@@ -110,7 +110,7 @@ impl Measurement {
             0.0
         };
         match self.status {
-            Status::Coarse => self.widen_coarse(window, held_up / QUEUE_SIGMA),
+            Status::Coarse => self.widen_coarse(window, held_up / QUEUE_SIGMA, roll),
             Status::Locked if self.pose.in_period() < MARK_BLOCKS => self.widen_mark(),
             _ => {}
         }
@@ -183,15 +183,16 @@ impl Measurement {
     }
 
     /// A coarse reading that may be farther off than any reading may be is none, as the next window will show more; but where the
-    /// stream ended before one was full, it is all there is. `stretch` is the share by which the window may be stretched.
-    fn widen_coarse(&mut self, window: &Window<'_>, stretch: f32) {
+    /// stream ended before one was full, it is all there is. `stretch` is the share by which the window may be stretched, the roll
+    /// what the camera may turn by.
+    fn widen_coarse(&mut self, window: &Window<'_>, stretch: f32, roll_rad_s: f32) {
         self.widen_mark();
-        let most = if window.duration_us < BASE_WINDOW_US {
-            MOST_SHORT_SIGMA
-        } else {
-            (MOST_ERROR - stretch) / COARSE_SIGMAS
-        };
-        if self.estimate.sigma_rad_s > most * self.omega_rad_s.abs() {
+        let short = window.duration_us < BASE_WINDOW_US;
+        let most = if short { MOST_SHORT_SIGMA } else { MOST_ERROR / COARSE_SIGMAS };
+        let stretched = stretch > MOST_ERROR && !short;
+        let own = self.estimate.sigma_rad_s;
+        let sigma_rad_s = sqrt(own * own + roll_rad_s * roll_rad_s);
+        if stretched || sigma_rad_s > most * self.omega_rad_s.abs() {
             self.status = Status::Refused(Reason::Ambiguous);
         }
     }
