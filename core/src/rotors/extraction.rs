@@ -185,6 +185,11 @@ pub struct View<'a> {
 }
 
 impl Extraction {
+    /// A search of what is outside these rotors.
+    pub fn beside(known: impl Iterator<Item = Disc>) -> Self {
+        Self { taken: known.take(MAX_ROTORS).map(covered).collect(), ..Self::default() }
+    }
+
     /// One bounded piece of work; `true` once [`Self::candidates`] stand.
     pub fn step(
         &mut self,
@@ -251,7 +256,8 @@ impl Extraction {
     // Not inlined: it is called in eight places.
     #[inline(never)]
     fn end(&mut self) {
-        if self.candidates.is_empty() && self.swept.is_none() {
+        let nothing = self.candidates.is_empty() && self.taken.is_empty();
+        if nothing && self.swept.is_none() {
             self.grid = CellGrid::default();
             self.stage = Stage::Moving;
             return;
@@ -270,8 +276,7 @@ impl Extraction {
 
     /// Enters a rotor; the search goes on without what it covers.
     fn take(&mut self, found: Found) {
-        let radius_px = COVERED * found.disc.radius_px;
-        self.taken.push(Disc { radius_px, ..found.disc }).ok();
+        self.taken.push(covered(found.disc)).ok();
         if self.quarter == 0 {
             self.tried.clear();
         }
@@ -291,4 +296,9 @@ impl Extraction {
             *least = candidate;
         }
     }
+}
+
+/// What a rotor is thought to cover.
+fn covered(disc: Disc) -> Disc {
+    Disc { radius_px: COVERED * disc.radius_px, ..disc }
 }

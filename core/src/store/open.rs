@@ -48,38 +48,54 @@ impl Default for Segment {
 }
 
 impl Store<'_> {
-    /// Takes in events of the open segment, each of which stands for 2^`weight_log2`: the others were thinned before.
+    /// Takes in events of the open segment, each of which stands for 2^`weight_log2`: the others were thinned before. `kept` hears
+    /// of those that it keeps, and of how many each stands for then, as a power of two.
     // A function of its own, so that all it needs stays in registers.
     #[inline(never)]
-    pub fn push(&mut self, events: &[PackedEvent], weight_log2: u8) {
+    pub fn push(
+        &mut self,
+        events: &[PackedEvent],
+        weight_log2: u8,
+        mut kept: impl FnMut(PackedEvent, u8),
+    ) {
         let slot = self.slot(self.closed);
-        let mut rest = events;
-        let mut kept = 0_u64;
-        loop {
-            let skip = (self.segments[slot].skip >> weight_log2) as usize;
-            let Some((event, later)) = rest.get(skip..).and_then(<[_]>::split_first) else { break };
-            self.keep(slot, *event, weight_log2);
-            kept += 1;
-            rest = later;
+        let skip = self.segments[slot].skip;
+        // What is to be passed over, in these events, and what is left of it that is less than one stands for.
+        let (mut next, mut rest) = ((skip >> weight_log2) as usize, skip);
+        let mut count = 0;
+        while next < events.len() {
+            if self.segments[slot].len >= self.segments[slot].until {
+                self.turn(slot);
+            }
+            let segment = &mut self.segments[slot];
+            let step_log2 = segment.step_log2;
+            let stride_log2 = step_log2.saturating_sub(weight_log2);
+            let stands_log2 = step_log2.max(weight_log2);
+            let base = slot * self.capacity;
+            let places = self.events.get_mut(base + segment.len..base + segment.until);
+            let places = places.unwrap_or_default();
+            // As many as go by the same step.
+            let every = events[next..].iter().step_by(1 << stride_log2);
+            let before = count;
+            for (place, event) in places.iter_mut().zip(every) {
+                *place = StoredEvent::store(*event, stands_log2);
+                kept(*event, stands_log2);
+                count += 1;
+            }
+            if count == before {
+                // No memory at all.
+                break;
+            }
+            segment.len += count - before;
+            next += (count - before) << stride_log2;
+            rest = (1 << step_log2) - 1;
         }
         let segment = &mut self.segments[slot];
-        segment.skip -= (rest.len() as u32) << weight_log2;
+        rest &= (1 << weight_log2) - 1;
+        segment.skip = (next.saturating_sub(events.len()) as u32) << weight_log2 | rest;
         let arrived = (events.len() as u64) << weight_log2;
         segment.counted += arrived;
-        self.thinned += arrived - kept;
-    }
-
-    #[inline(always)]
-    fn keep(&mut self, slot: usize, event: PackedEvent, weight_log2: u8) {
-        if self.segments[slot].len >= self.segments[slot].until {
-            self.turn(slot);
-        }
-        let segment = &mut self.segments[slot];
-        if let Some(place) = self.events.get_mut(slot * self.capacity + segment.len) {
-            *place = StoredEvent::store(event, segment.step_log2.max(weight_log2));
-            segment.len += 1;
-        }
-        segment.skip = (1 << segment.step_log2) - 1;
+        self.thinned += arrived - count as u64;
     }
 
     /// Chooses how many events the next ones stand for, and up to where; a full segment makes room first.

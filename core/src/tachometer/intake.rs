@@ -79,8 +79,7 @@ impl Tachometer<'_> {
             if self.overrun {
                 self.ignored.overrun += (passed.len() as u64) << weight_log2;
             } else {
-                self.heat.add(passed);
-                self.store.push(passed, weight_log2);
+                self.store_all(passed, weight_log2);
             }
             taken += passed.len();
             let Some(stopped) = events.get(taken) else { break };
@@ -131,9 +130,13 @@ impl Tachometer<'_> {
             self.ignored.overrun += count;
             return;
         }
-        let packed = [PackedEvent::pack(event)];
-        self.heat.add(&packed);
-        self.store.push(&packed, weight_log2);
+        self.store_all(&[PackedEvent::pack(event)], weight_log2);
+    }
+
+    /// Takes in events of the open segment. The heat map counts what the store keeps, each for as many as it stands for.
+    fn store_all(&mut self, events: &[PackedEvent], weight_log2: u8) {
+        self.store
+            .push(events, weight_log2, |event, stands_log2| self.heat.count(event, stands_log2));
     }
 
     /// Forgets the window; rotors keep their letters.
@@ -151,6 +154,8 @@ impl Tachometer<'_> {
     /// Closes segments until the open one holds `t_us`.
     fn advance(&mut self, t_us: u64) {
         let gap_us = t_us - self.store.open_end_us();
+        let spare_us = self.store.spare() as u64 * u64::from(self.store.segment_us());
+        let goes_on = self.window_segments > 0 && gap_us < spare_us;
         if gap_us > u64::from(LONGEST_WINDOW_US) && self.window_segments == 0 {
             // Nothing for longer than any window: what went before says nothing about what comes.
             self.restart(t_us);
@@ -158,17 +163,26 @@ impl Tachometer<'_> {
         }
         while t_us >= self.store.open_end_us() {
             if self.store.full() {
-                self.overrun = true;
-                return;
+                if !goes_on {
+                    self.overrun = true;
+                    return;
+                }
+                self.ignored.overrun += self.store.give_up(self.window_segments);
+                self.heat.fade(WINDOW_SEGMENTS as u16);
             }
             self.store.close_segment();
+            self.begin();
+        }
+    }
+
+    /// Begins to measure the window once it is full, or makes it longer first.
+    pub(super) fn begin(&mut self) {
+        while self.window_segments == 0 && self.store.closed() >= WINDOW_SEGMENTS {
             let window_us = self.store.segment_us() * WINDOW_SEGMENTS as u32;
-            if self.window_segments == 0 && self.store.closed() >= WINDOW_SEGMENTS {
-                if window_us + WINDOW_SEGMENTS as u32 <= self.target_us {
-                    self.store.lengthen(segment_us(self.target_us.min(2 * window_us)));
-                } else {
-                    self.start(WINDOW_SEGMENTS);
-                }
+            if window_us + WINDOW_SEGMENTS as u32 <= self.target_us {
+                self.store.lengthen(segment_us(self.target_us.min(2 * window_us)));
+            } else {
+                self.start(WINDOW_SEGMENTS);
             }
         }
     }
