@@ -189,7 +189,7 @@ impl Measurement {
         self.widen_mark();
         let short = window.duration_us < BASE_WINDOW_US;
         let most = if short { MOST_SHORT_SIGMA } else { MOST_ERROR / COARSE_SIGMAS };
-        let stretched = stretch > MOST_ERROR && !short;
+        let stretched = stretch > MOST_ERROR;
         let own = self.estimate.sigma_rad_s;
         let sigma_rad_s = sqrt(own * own + roll_rad_s * roll_rad_s);
         if stretched || sigma_rad_s > most * self.omega_rad_s.abs() {
