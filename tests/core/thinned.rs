@@ -61,7 +61,7 @@ fn stretches_that_were_thinned_do_not_bend_a_speed() {
                     "{rpm} rpm"
                 );
                 let rotor = &reading.rotors[0];
-                assert_eq!(rotor.blades, Some(blades as u8), "{rpm} rpm");
+                assert_eq!(rotor.blades, Some(blades), "{rpm} rpm");
                 let speed = rotor.speed.as_ref().expect("a speed");
                 let off_rpm = f64::from(speed.rpm()) - rpm.abs();
                 let sigma_rpm = f64::from(speed.rpm_sigma());

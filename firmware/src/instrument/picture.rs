@@ -98,14 +98,14 @@ mod tests {
         let mut heat = HeatMap::new(&mut counts, Geometry { width_px: 40, height_px: 80 });
         for (x, events) in [(0, 10), (4, 100), (8, 200), (12, 60_000)] {
             for _ in 0..events {
-                heat.add(&[PackedEvent::new(0, x, 8, Polarity::On)]);
+                heat.count(PackedEvent::new(0, x, 8, Polarity::On), 0);
             }
         }
         // A rotor, beside which the hot pixel is one cell in a hundred.
         for cell in 0..100_u16 {
             for _ in 0..200 {
                 let (x, y) = (cell % 10 * 4, 40 + cell / 10 * 4);
-                heat.add(&[PackedEvent::new(0, x, y, Polarity::On)]);
+                heat.count(PackedEvent::new(0, x, y, Polarity::On), 0);
             }
         }
         let mut picture = Picture::EMPTY;

@@ -185,7 +185,8 @@ mod tests {
             for letter in source.row.clone().chain(source.others.chars()) {
                 let key = letter.to_string();
                 let entry = source.font.charmap.get(&key);
-                let Some((_, glyph)) = packed.set(&key).next() else { panic!("{letter} is gone") };
+                let glyph = packed.set(&key).next().map(|(_, glyph)| glyph);
+                let glyph = glyph.expect(&key);
                 let image = entry.glyph.images.get(0).mul_offset(1, -1);
                 let levels: Vec<u8> =
                     image.colors().into_iter().map(|level| level.luma()).collect();
