@@ -1,9 +1,10 @@
 //! The event store: a window of events in a fixed memory.
 //!
 //! Time is cut into segments of equal length; [`WINDOW_SEGMENTS`] of them are the window, and
-//! [`SPARE_SEGMENTS`] more take in events while the window is measured. A segment first keeps a dense
-//! burst of consecutive events (what a registration of neighbouring slices needs), then, octave by octave, every
-//! second, fourth and eighth event, so that the baseline grows geometrically from the burst on; what is left of
+//! [`SPARE_SEGMENTS`] more take in events while the window is measured. A segment keeps all its events until it is full; then
+//! every second one behind a dense burst of consecutive events goes, and so on as it fills again. The burst (what a registration of
+//! neighbouring slices needs) stays, and behind it one octave each time: every second, fourth and eighth event, so that
+//! the baseline grows geometrically from the burst on; what is left of
 //! its memory is a reservoir thinned evenly (what a long baseline needs): every 2^s-th event, s growing as
 //! the reservoir fills. What is kept depends on the events and the capacity alone, never on when a task ran.
 

@@ -22,8 +22,8 @@ use crate::speed::polar::PolarTrack;
 use crate::store::{Store, WINDOW_SEGMENTS};
 use crate::tracker::Tracker;
 
-pub use work::Work;
 use work::Scratch;
+pub use work::Work;
 
 /// First window: short, so that a recording of a few milliseconds is spread over all segments; it doubles
 /// until the base window is reached.

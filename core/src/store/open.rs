@@ -6,11 +6,11 @@ use crate::event::PackedEvent;
 
 /// Sixteenths of a segment that keep consecutive events.
 const DENSE_SIXTEENTHS: usize = 4;
-/// Sixteenths before the reservoir starts.
-const BURST_SIXTEENTHS: usize = 7;
+/// Sixteenths that keep every second, every fourth and every eighth, each in one.
+const OCTAVES: u8 = 3;
 
 /// What is known of a segment beside its events.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Segment {
     /// Events kept.
     pub len: usize,
@@ -20,31 +20,10 @@ pub(super) struct Segment {
     pub lost: u64,
     pub roll_sum_rad_s: f32,
     pub roll_count: u32,
-    /// The reservoir keeps every 2^stride_log2-th event.
+    /// Every 2^stride_log2-th event is kept.
     pub stride_log2: u8,
     /// Events to pass over before the next is kept.
     pub skip: u32,
-    /// Until so many are kept, every 2^step_log2-th event is.
-    pub until: usize,
-    pub step_log2: u8,
-}
-
-impl Default for Segment {
-    fn default() -> Self {
-        // Where the octaves end, the reservoir goes on as densely as the last of them.
-        let stride_log2 = (BURST_SIXTEENTHS - DENSE_SIXTEENTHS) as u8;
-        Self {
-            len: 0,
-            counted: 0,
-            lost: 0,
-            roll_sum_rad_s: 0.0,
-            roll_count: 0,
-            stride_log2,
-            skip: 0,
-            until: 0,
-            step_log2: 0,
-        }
-    }
 }
 
 impl Store<'_> {
@@ -70,47 +49,37 @@ impl Store<'_> {
 
     #[inline(always)]
     fn keep(&mut self, slot: usize, event: PackedEvent) {
-        if self.segments[slot].len >= self.segments[slot].until {
-            self.turn(slot);
+        if self.segments[slot].len == self.capacity {
+            self.thin(slot);
         }
         let segment = &mut self.segments[slot];
         if let Some(place) = self.events.get_mut(slot * self.capacity + segment.len) {
-            *place = StoredEvent::store(event, segment.step_log2);
+            *place = StoredEvent::store(event, segment.stride_log2);
             segment.len += 1;
         }
-        segment.skip = (1 << segment.step_log2) - 1;
+        segment.skip = (1 << segment.stride_log2) - 1;
     }
 
-    /// Chooses how many events the next ones stand for, and up to where; a full segment makes room first.
+    /// Makes room in a full segment: every other event goes, those kept stay evenly spread.
     #[cold]
-    fn turn(&mut self, slot: usize) {
-        let (base, burst, octave) = (slot * self.capacity, self.burst(), self.capacity / 16);
+    fn thin(&mut self, slot: usize) {
+        let base = slot * self.capacity;
         let segment = &mut self.segments[slot];
-        if segment.len == self.capacity {
-            // Halve the reservoir: every other event goes, those kept stay evenly spread.
-            let reservoir = &mut self.events[base + burst..base + self.capacity];
-            let kept = reservoir.len() / 2;
-            self.thinned += (reservoir.len() - kept) as u64;
-            segment.len = burst + kept;
-            segment.stride_log2 = (segment.stride_log2 + 1).min(MOST_WEIGHT_LOG2);
-            for i in 0..kept {
-                reservoir[i] = reservoir[2 * i].weighing(segment.stride_log2);
-            }
+        let first = as_they_came(self.capacity, segment.stride_log2);
+        let sparser = &mut self.events[base + first..base + self.capacity];
+        let kept = sparser.len() / 2;
+        self.thinned += (sparser.len() - kept) as u64;
+        segment.len = first + kept;
+        segment.stride_log2 = (segment.stride_log2 + 1).min(MOST_WEIGHT_LOG2);
+        for i in 0..kept {
+            sparser[i] = sparser[2 * i].weighing(segment.stride_log2);
         }
-        let part = segment.len.checked_div(octave).unwrap_or(0);
-        (segment.step_log2, segment.until) = if octave == 0 {
-            (0, self.capacity)
-        } else if part < DENSE_SIXTEENTHS {
-            (0, DENSE_SIXTEENTHS * octave)
-        } else if part < BURST_SIXTEENTHS {
-            ((part - DENSE_SIXTEENTHS + 1) as u8, (part + 1) * octave)
-        } else {
-            (segment.stride_log2, self.capacity)
-        };
     }
+}
 
-    /// Events of a segment that come before its reservoir.
-    pub(super) const fn burst(&self) -> usize {
-        BURST_SIXTEENTHS * (self.capacity / 16)
-    }
+/// Events at a segment's start that stay as they are when those behind them are thinned from one in 2^stride_log2 to half of
+/// that: the dense burst, and one octave more each time, up to where the reservoir starts.
+pub(super) const fn as_they_came(capacity: usize, stride_log2: u8) -> usize {
+    let octaves = if stride_log2 < OCTAVES { stride_log2 } else { OCTAVES };
+    (DENSE_SIXTEENTHS + octaves as usize) * (capacity / 16)
 }
