@@ -1,11 +1,11 @@
 //! Longer segments out of shorter ones.
 
 use super::event::MOST_WEIGHT_LOG2;
-use super::open::as_they_came;
+use super::open::{as_they_came, level};
 use super::{SEGMENTS, Segment, Store};
 
 impl Store<'_> {
-    /// Makes segments longer, keeping what is stored: each new segment keeps the burst of the first old one in
+    /// Makes segments longer, keeping what is stored: each new segment keeps the burst and the octaves of the first old one in
     /// it, and of the rest every event that stands for as many as the new reservoir's stride says.
     /// `segment_us` is at least the length so far. Cost: two passes over the store.
     pub fn lengthen(&mut self, segment_us: u32) {
@@ -17,7 +17,6 @@ impl Store<'_> {
         for new in 0..=closed {
             let end_us = ((new as u64 + 1) * u64::from(segment_us)).min(i32::MAX as u64) as i32;
             let mut merged = self.plan_merge(&old, (from, index), end_us);
-            let stride = 1_u64 << merged.stride_log2;
             let burst = as_they_came(self.capacity, merged.stride_log2);
             let first = from;
             let (mut passed, mut next) = (0_u64, 0_u64);
@@ -31,17 +30,16 @@ impl Store<'_> {
                         break;
                     }
                     index += 1;
-                    let in_burst = from == first && merged.len < burst;
-                    let kept = in_burst || passed >= next;
-                    if !in_burst {
-                        passed += 1 << event.weight_log2();
-                    }
+                    let level = if from == first && merged.len < burst {
+                        level(self.capacity, merged.len)
+                    } else {
+                        merged.stride_log2
+                    };
+                    let kept = passed >= next;
+                    passed += 1 << event.weight_log2();
                     if kept && merged.len < self.capacity {
-                        if !in_burst {
-                            next += stride;
-                        }
-                        let weight =
-                            if in_burst { event.weight_log2() } else { merged.stride_log2 };
+                        let weight = event.weight_log2().max(level);
+                        next += 1 << weight;
                         self.events[base + merged.len] = event.weighing(weight);
                         merged.len += 1;
                     } else {

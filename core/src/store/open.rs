@@ -83,3 +83,12 @@ pub(super) const fn as_they_came(capacity: usize, stride_log2: u8) -> usize {
     let octaves = if stride_log2 < OCTAVES { stride_log2 } else { OCTAVES };
     (DENSE_SIXTEENTHS + octaves as usize) * (capacity / 16)
 }
+
+/// What an event at this place of a segment stands for at least once all behind the burst is thinned, as a power of two.
+pub(super) const fn level(capacity: usize, place: usize) -> u8 {
+    let mut level = 0;
+    while level < OCTAVES && place >= as_they_came(capacity, level) {
+        level += 1;
+    }
+    level
+}
