@@ -50,6 +50,12 @@ impl PackedEvent {
         Self { low_us, pixel: (polarity as u32) << 31 | (y as u32) << 16 | x as u32 }
     }
 
+    /// The same of a pixel that is packed already: column, row, and in the highest bit whether it became brighter.
+    #[inline]
+    pub(crate) const fn of_pixel(low_us: u32, pixel: u32) -> Self {
+        Self { low_us, pixel }
+    }
+
     /// The event with the high bits of its time left out; rows beyond 32 767 become that one.
     #[must_use]
     #[inline]

@@ -33,8 +33,8 @@ pub const WINDING_PHASORS: usize = 128;
 /// Events in a slice for registration: 2 x 512 x 16 B = 16 KiB.
 pub const SLICE_POINTS: usize = 512;
 
-/// Side of the nearest-neighbour grid in cells: 40 x 40 x 2 B = 3.1 KiB.
-pub const GRID_CELLS_SIDE: usize = 40;
+/// Side of the nearest-neighbour grid in cells, about as many as a slice has points of a polarity: 2 x 24 x 24 x 2 B = 2.3 KiB.
+pub const GRID_CELLS_SIDE: usize = 24;
 
 /// Largest blade count that is named; more are measured, but not counted.
 pub const MAX_BLADES: u8 = 8;

@@ -1,8 +1,10 @@
 //! The event store: a window of events in a fixed memory.
 //!
 //! Time is cut into segments of equal length; [`WINDOW_SEGMENTS`] of them are the window, and
-//! [`SPARE_SEGMENTS`] more take in events while the window is measured. A segment keeps all its events until it is full; then
-//! every second one behind a dense burst of consecutive events goes, and so on as it fills again. The burst (what a registration of
+//! a few more take in events while the window is measured; when these are full, the oldest of them is given up, so that
+//! what stands behind the window is always the latest, without a gap. A segment
+//! keeps all its events until it is full; then every second one behind a dense burst of consecutive events goes, and so on as it
+//! fills again. The burst (what a registration of
 //! neighbouring slices needs) stays, and behind it one octave each time: every second, fourth and eighth event, so that
 //! the baseline grows geometrically from the burst on; what is left of
 //! its memory is a reservoir thinned evenly (what a long baseline needs): every 2^s-th event, s growing as
@@ -15,6 +17,7 @@ mod open;
 mod window;
 
 pub use even::Even;
+pub(crate) use event::MOST_WEIGHT_LOG2;
 pub use event::StoredEvent;
 pub use window::{Account, Window};
 
@@ -22,10 +25,10 @@ use open::Segment;
 
 /// Segments in a window.
 pub const WINDOW_SEGMENTS: usize = 6;
-/// Segments filled while a window is measured.
-pub const SPARE_SEGMENTS: usize = 2;
-/// Segments in the ring.
-pub const SEGMENTS: usize = WINDOW_SEGMENTS + SPARE_SEGMENTS;
+/// Most segments filled while a window is measured.
+pub const MOST_SPARE: usize = 4;
+/// Most segments in the ring.
+pub const MOST_SEGMENTS: usize = WINDOW_SEGMENTS + MOST_SPARE;
 
 /// Events of the recent past, in time order.
 #[derive(Debug)]
@@ -33,28 +36,36 @@ pub struct Store<'m> {
     events: &'m mut [StoredEvent],
     /// Events in one segment: 4/16 dense, 3/16 in octaves, 9/16 reservoir.
     capacity: usize,
-    segments: [Segment; SEGMENTS],
-    /// Ring position of the oldest segment.
-    first: usize,
+    segments: [Segment; MOST_SEGMENTS],
+    /// Where in the memory the segments lie, the oldest first.
+    places: [u8; MOST_SEGMENTS],
+    /// Segments in use.
+    ring: usize,
     /// Closed segments.
     closed: usize,
     /// Start of the oldest segment.
     start_us: u64,
+    /// Segments given up behind those that are measured.
+    given_up: u64,
     segment_us: u32,
     thinned: u64,
 }
 
 impl<'m> Store<'m> {
-    /// An empty store over the lent memory; `segment_us` is at least 1.
-    pub fn new(events: &'m mut [StoredEvent], segment_us: u32) -> Self {
-        let capacity = events.len() / SEGMENTS;
+    /// An empty store over the lent memory, which is cut into a window and `spare` segments more, 2 to [`MOST_SPARE`];
+    /// `segment_us` is at least 1.
+    pub fn new(events: &'m mut [StoredEvent], spare: usize, segment_us: u32) -> Self {
+        let ring = WINDOW_SEGMENTS + spare.clamp(2, MOST_SPARE);
+        let capacity = events.len() / ring;
         Self {
             events,
             capacity,
-            segments: [Segment::default(); SEGMENTS],
-            first: 0,
+            segments: [Segment::default(); MOST_SEGMENTS],
+            places: core::array::from_fn(|place| place as u8),
+            ring,
             closed: 0,
             start_us: 0,
+            given_up: 0,
             segment_us: segment_us.max(1),
             thinned: 0,
         }
@@ -62,10 +73,10 @@ impl<'m> Store<'m> {
 
     /// Forgets everything; the next segment starts at `start_us`.
     pub fn restart(&mut self, start_us: u64, segment_us: u32) {
-        self.segments = [Segment::default(); SEGMENTS];
-        self.first = 0;
+        self.segments = [Segment::default(); MOST_SEGMENTS];
         self.closed = 0;
         self.start_us = start_us;
+        self.given_up = 0;
         self.segment_us = segment_us.max(1);
     }
 
@@ -84,7 +95,7 @@ impl<'m> Store<'m> {
     /// First instant after the segment that is being filled.
     #[must_use]
     pub const fn open_end_us(&self) -> u64 {
-        self.start_us + (self.closed as u64 + 1) * self.segment_us as u64
+        self.start_us + (self.closed as u64 + 1 + self.given_up) * self.segment_us as u64
     }
 
     /// Closed segments.
@@ -93,14 +104,26 @@ impl<'m> Store<'m> {
         self.closed
     }
 
-    /// Whether the open segment is the last of the ring, so that closing it needs [`Self::drop_oldest`].
+    /// Segments that fill while a window is measured, the open one among them.
+    #[must_use]
+    pub const fn spare(&self) -> usize {
+        self.ring - WINDOW_SEGMENTS
+    }
+
+    /// Whether the open segment is the last of the ring, so that closing it needs [`Self::drop_oldest`] or [`Self::give_up`].
     #[must_use]
     pub const fn full(&self) -> bool {
-        self.closed + 1 == SEGMENTS
+        self.closed + 1 == self.ring
+    }
+
+    /// Whether segments were given up behind those that are measured, so that what follows does not go on from these.
+    #[must_use]
+    pub const fn is_torn(&self) -> bool {
+        self.given_up > 0
     }
 
     const fn slot(&self, index: usize) -> usize {
-        (self.first + index) % SEGMENTS
+        self.places[index] as usize
     }
 
     /// Counts events lost before they reached the store.
@@ -124,13 +147,36 @@ impl<'m> Store<'m> {
         self.segments[slot] = Segment::default();
     }
 
-    /// Gives up the oldest closed segment.
+    /// Moves on from the oldest closed segment.
     pub fn drop_oldest(&mut self) {
         if self.closed > 0 {
-            self.first = self.slot(1);
+            self.places[..self.ring].rotate_left(1);
             self.closed -= 1;
             self.start_us += u64::from(self.segment_us);
         }
+    }
+
+    /// Gives up the oldest closed segment behind the first `measured` ones, and returns how many events went with it
+    /// that counted as used or thinned so far.
+    pub fn give_up(&mut self, measured: usize) -> u64 {
+        if measured >= self.closed {
+            return 0;
+        }
+        let Segment { counted, len, .. } = self.segments[self.slot(measured)];
+        self.thinned = self.thinned.saturating_sub(counted.saturating_sub(len as u64));
+        self.places[measured..self.ring].rotate_left(1);
+        self.closed -= 1;
+        self.given_up += 1;
+        counted
+    }
+
+    /// Moves on from the first `measured` segments to what follows the ones given up behind them.
+    pub fn mend(&mut self, measured: usize) {
+        for _ in 0..measured.min(self.closed) {
+            self.drop_oldest();
+        }
+        self.start_us += self.given_up * u64::from(self.segment_us);
+        self.given_up = 0;
     }
 }
 

@@ -2,13 +2,14 @@
 //!
 //! [`Tachometer::push`] takes in events and never waits; [`Tachometer::poll`] advances the measurement of a full
 //! window in bounded steps. A reading is a function of the events of its window, their times and the capacities alone.
-//! Which windows are measured depends on speed only when a measurement takes longer than [`crate::store::SPARE_SEGMENTS`]
-//! segments: then events are left out and counted until it ends, and the next window starts afresh.
+//! Which windows are measured depends on speed only when a measurement takes longer than the spare segments last:
+//! then the oldest of these are given up, their events counted, and the next window begins with those that are left.
 
 mod conclude;
 mod gate;
 mod intake;
 mod job;
+mod rhythm;
 mod work;
 
 use heapless::Vec;
@@ -21,6 +22,7 @@ use crate::speed::measurement::{Measurement, Outcome};
 use crate::speed::polar::PolarTrack;
 use crate::store::{Store, WINDOW_SEGMENTS};
 use crate::tracker::Tracker;
+use rhythm::Rhythm;
 
 use work::Scratch;
 pub use work::Work;
@@ -34,7 +36,6 @@ pub const BASE_WINDOW_US: u32 = 150_000;
 pub const LONGEST_WINDOW_US: u32 = 2_000_000;
 
 #[derive(Debug, Default)]
-#[expect(clippy::large_enum_variant, reason = "no heap to box the larger one on")]
 enum Job {
     #[default]
     Idle,
@@ -56,6 +57,7 @@ struct Suspect {
 #[derive(Debug)]
 pub struct Tachometer<'m> {
     settings: Settings,
+    rhythm: Rhythm,
     store: Store<'m>,
     heat: HeatMap<'m>,
     weights: &'m mut [u8],
@@ -66,7 +68,8 @@ pub struct Tachometer<'m> {
     window_segments: usize,
     /// End of the stored events when the measurement started: a last window may not be full.
     window_end_us: u64,
-    /// Whether the store has filled before the measurement ended.
+    /// Whether, while a window was measured, nothing came for longer than the spare segments last: what they hold does not go
+    /// on from the window, nor what comes from them.
     overrun: bool,
     /// Whether the last reading was a lock, so that the rest of a stream need not be looked at.
     satisfied: bool,
@@ -88,10 +91,12 @@ impl<'m> Tachometer<'m> {
     #[must_use]
     pub fn new(settings: Settings, memory: Memory<'m>) -> Self {
         let heat = HeatMap::new(memory.heat, settings.geometry);
+        let rhythm = Rhythm::of(memory.events.len());
         let Work { polar, spectrum, scratch } = memory.work;
         Self {
             settings,
-            store: Store::new(memory.events, segment_us(FIRST_WINDOW_US)),
+            rhythm,
+            store: Store::new(memory.events, rhythm.spare, segment_us(FIRST_WINDOW_US)),
             heat,
             weights: memory.weights,
             started: false,
@@ -149,6 +154,12 @@ impl<'m> Tachometer<'m> {
     #[must_use]
     pub const fn heat(&self) -> &HeatMap<'m> {
         &self.heat
+    }
+
+    /// Whether a window is being measured: otherwise a poll does nothing.
+    #[must_use]
+    pub const fn is_measuring(&self) -> bool {
+        self.window_segments > 0
     }
 
     /// Name of the stage that the next poll works on.

@@ -10,7 +10,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("cargo:rerun-if-changed=src/ui/fonts.rs");
     println!("cargo:rerun-if-changed=../memory.x");
     let out = PathBuf::from(env::var("OUT_DIR")?);
-    fs::write(out.join("fonts.rs"), fonts::packed())?;
+    fs::write(out.join("fonts.rs"), fonts::packed()?)?;
     if env::var("CARGO_CFG_TARGET_OS")? == "none" {
         // A copy, because the linker finds the original from some folders only, and cargo would
         // not link again after it has been edited.

@@ -69,11 +69,18 @@ impl<C: Clock> Costs<C> {
         Self { clock, stages: LinearMap::new(), pushed: 0, push: none, spent }
     }
 
-    /// Pushes events, the first of them of the time `first_us` in microseconds. Not inlined, so that there is one of it however many tasks measure.
+    /// Pushes events, the first of them of the time `first_us` in microseconds, each standing for 2^`weight_log2`. Not
+    /// inlined, so that there is one of it however many tasks measure.
     #[inline(never)]
-    pub fn push(&mut self, tachometer: &mut Tachometer<'_>, first_us: u64, events: &[PackedEvent]) {
+    pub fn push(
+        &mut self,
+        tachometer: &mut Tachometer<'_>,
+        first_us: u64,
+        events: &[PackedEvent],
+        weight_log2: u8,
+    ) {
         let start = self.clock.ticks();
-        tachometer.push_packed(first_us, events);
+        tachometer.push_thinned(first_us, events, weight_log2);
         let ticks = self.clock.ticks() - start;
         self.push.add(ticks);
         self.pushed += events.len() as u64;
@@ -83,6 +90,10 @@ impl<C: Clock> Costs<C> {
     /// Polls once. Not inlined, for the same reason.
     #[inline(never)]
     pub fn poll(&mut self, tachometer: &mut Tachometer<'_>, steps: u32) -> Poll {
+        if !tachometer.is_measuring() {
+            // After nearly every block of events: telling the time would cost more than the answer.
+            return Poll::Idle;
+        }
         let stage = tachometer.stage();
         let start = self.clock.ticks();
         let poll = tachometer.poll(steps);

@@ -13,8 +13,8 @@ use crate::record::{Decoder, Header, HeaderError, RECORD_BYTES};
 /// Events in one block: 128 x 8 B = 1 KiB; at 1 Mev/s a block fills in 128 us.
 pub const BLOCK_EVENTS: usize = 128;
 
-/// Blocks between taking in and measuring: 32 x 1 KiB = 32 KiB, 4 ms at 1 Mev/s. That is how long a step
-/// of the measurement may take: 0.9 million instructions at 216 MHz.
+/// Blocks between taking in and measuring: 32 x 1 KiB = 32 KiB, 4 ms at 1 Mev/s. For half of that time all events are
+/// kept while a step of the measurement runs, then ever fewer: see [`crate::sensor`].
 pub const BLOCKS: usize = 32;
 
 /// Gyro samples in one block. Sensors take about a thousand a second, and a block is sent when it holds so many.
@@ -27,6 +27,8 @@ pub struct Block {
     filled: usize,
     /// Samples of the sensor's gyro that came between these.
     pub gyro: Vec<GyroSample, BLOCK_GYRO>,
+    /// Each event stands for 2^`weight_log2`: the others were left out, evenly.
+    pub weight_log2: u8,
     /// Time of the first event in microseconds: packed ones tell only its low 32 bits.
     pub t_us: u64,
     /// Size of the sensor that they come from.
@@ -43,6 +45,7 @@ impl Block {
         places: [PackedEvent::ZERO; BLOCK_EVENTS],
         filled: 0,
         gyro: Vec::new(),
+        weight_log2: 0,
         t_us: 0,
         // All zeros, so that the blocks need no image in flash.
         geometry: Geometry { width_px: 0, height_px: 0 },
@@ -59,6 +62,7 @@ impl Block {
     /// Forgets the events, and what the gyro said.
     pub fn clear(&mut self) {
         self.filled = 0;
+        self.weight_log2 = 0;
         self.gyro.clear();
     }
 
@@ -78,15 +82,17 @@ impl Block {
         self.filled = (self.filled + count).min(BLOCK_EVENTS);
     }
 
-    /// Keeps the events from the place `from` on for which `kept` holds, and returns how many went.
-    pub fn retain(&mut self, from: usize, mut kept: impl FnMut() -> bool) -> usize {
+    /// Keeps one in 2^`stride_log2` of the events from the place `from` on, and returns how many went. `phase` counts events
+    /// from block to block.
+    pub fn thin(&mut self, from: usize, stride_log2: u8, phase: &mut u32) -> usize {
         let before = self.filled;
         self.filled = from.min(before);
-        for index in self.filled..before {
-            if kept() {
-                self.places[self.filled] = self.places[index];
-                self.filled += 1;
-            }
+        let stride = 1 << stride_log2;
+        let first = self.filled + stride - 1 - (*phase as usize & (stride - 1));
+        *phase = phase.wrapping_add((before - self.filled) as u32);
+        for index in (first..before).step_by(stride) {
+            self.places[self.filled] = self.places[index];
+            self.filled += 1;
         }
         before - self.filled
     }

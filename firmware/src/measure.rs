@@ -28,7 +28,7 @@ impl<C: Clock> Intake<'_, '_, C> {
         if block.lost > 0 {
             self.tachometer.lost(block.lost);
         }
-        self.costs.push(self.tachometer, block.t_us, block.events());
+        self.costs.push(self.tachometer, block.t_us, block.events(), block.weight_log2);
         for sample in &block.gyro {
             self.tachometer.gyro(*sample);
         }

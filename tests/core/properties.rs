@@ -219,3 +219,39 @@ fn the_rhythm_of_pushing_and_polling_changes_no_bit() {
         }
     }
 }
+
+/// A processor that is too slow misses windows, and no more than it must: what came last is there when it is done.
+#[test]
+fn a_measurement_that_lasts_long_leaves_the_latest_events_to_the_next() {
+    const STEPS_A_PIECE: u32 = 1;
+    const PIECE_EVENTS: usize = 512;
+    const WINDOW_US: u64 = 150_000;
+    let rotor = Rotor { x_px: 110.0, y_px: 95.0, radius_px: 45.0, ..Rotor::default() };
+    let (width_px, height_px) = (WIDTH_PX, HEIGHT_PX);
+    let rotors = vec![rotor];
+    let scene = Scene { width_px, height_px, duration_ms: 1_500.0, rotors, ..Scene::default() };
+    let events = generate(&scene).expect("a scene in range").events;
+    let settings = Settings::new(Geometry::new(WIDTH_PX, HEIGHT_PX).expect("a sensor in range"));
+    with_tachometer(settings, Capacity::Device, |tachometer| {
+        // Sensor time at which each reading stood, and the reading.
+        let mut readings = Vec::new();
+        for piece in events.chunks(PIECE_EVENTS) {
+            tachometer.push(piece);
+            if let Poll::Ready(reading) = tachometer.poll(STEPS_A_PIECE) {
+                readings.push((piece[piece.len() - 1].t_us, reading));
+            }
+        }
+        assert!(tachometer.ignored().overrun > 0, "nothing was late");
+        assert!(readings.len() > 3, "{} readings", readings.len());
+        for pair in readings.windows(2) {
+            let [(told_us, before), (_, next)] = pair else { unreachable!() };
+            assert_eq!(u64::from(next.window_us), WINDOW_US);
+            let start_us = next.t_us - WINDOW_US / 2;
+            // Three whole segments of 25 ms, and the one that was open; or four on, where it was not late.
+            let on_us = before.t_us - WINDOW_US / 2 + 100_000;
+            let latest_us = on_us.max(told_us.saturating_sub(75_000));
+            assert!(start_us <= latest_us, "{start_us} us, told at {told_us} us");
+            assert!(next.rotors.iter().any(|rotor| rotor.speed.is_some()), "{next:?}");
+        }
+    });
+}

@@ -11,7 +11,9 @@ use embassy_time::{Duration, MockDriver, Timer};
 use embassy_usb_driver::Speed;
 use embassy_usb_host::BusState;
 use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
-use evtach_core::{Event, GyroSample, Memory, Reading, Settings, Status, StoredEvent, Tachometer, Work};
+use evtach_core::{
+    Event, GyroSample, Memory, Reading, Settings, Status, StoredEvent, Tachometer, Work,
+};
 use evtach_firmware::cost::{Costs, Spent};
 use evtach_firmware::intake::{BLOCKS, Block, Pace};
 use evtach_firmware::measure::{Companion, measure};
@@ -20,8 +22,8 @@ use evtach_firmware::sensor::usb::{Acquired, Model, acquire};
 use evtach_host::measure::{Capacity, measure_events};
 use evtach_host::synth::{self, Rotor, Scene};
 
-/// Time that passes when everything waits.
-const STEP: Duration = Duration::from_micros(50);
+/// Time that passes when everything waits, and behind each step of the measurement: thousands of these in a search.
+const STEP: Duration = Duration::from_micros(20);
 
 /// Runs a future in a time that stands still while anything is worked on. One at a time: there is one time.
 fn block_on<T>(future: impl Future<Output = T>) -> T {

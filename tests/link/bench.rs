@@ -4,7 +4,7 @@ use evtach_core::{Event, Geometry, PackedEvent, Reading, Reason};
 use evtach_firmware::instrument::{Fault, Preferences, Sensor};
 use evtach_firmware::recorder::Recorder;
 use evtach_firmware::scpi::{
-    Device, Identity, Link, RecorderFailed, RecorderStatus, Statistics, View,
+    Device, Fate, Identity, Link, RecorderFailed, RecorderStatus, Statistics, View,
 };
 use evtach_firmware::sensor::usb::Trouble;
 
@@ -129,6 +129,10 @@ impl Device for Bench {
 
     fn statistics(&self) -> Option<Statistics> {
         self.statistics
+    }
+
+    fn fate(&self) -> Fate {
+        Fate { used: 800, thinned: 150, late: 30, lost_before: 15, overrun: 5 }
     }
 
     fn revolutions(&self) -> Option<f32> {

@@ -372,6 +372,7 @@ fn why_there_is_no_sensor_is_told() {
     assert_eq!(session.ask("SYST:SENS?"), "\"absent\",\"\"\n");
     session.bench.trouble = Some(Trouble::Foreign { vendor_id: 0x046d, product_id: 0xc52b });
     let words = "046d:c52b is no camera known here: plug in another";
+    assert_eq!(session.ask("SYST:EVEN?"), "800,150,30,15,5\n");
     assert_eq!(session.ask("SYST:SENS?"), format!("\"refused\",\"{words}\"\n"));
 }
 

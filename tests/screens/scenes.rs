@@ -293,7 +293,7 @@ fn picture(rotors: &[Rotor]) -> Picture {
             }
         }
         for _ in 0..events.max(0.0) as u32 {
-            heat.add(&[PackedEvent::new(0, x as u16, y as u16, Polarity::On)]);
+            heat.count(PackedEvent::new(0, x as u16, y as u16, Polarity::On), 0);
         }
     }
     let mut picture = Picture::EMPTY;

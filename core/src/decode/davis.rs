@@ -82,6 +82,8 @@ impl Davis {
     /// Decodes words into `events`, until either is used up, or a gyro sample is complete, or
     /// the clock is set to zero. Times are `offset_us` later than
     /// the camera's, and never earlier than `reached_us`, which they move on.
+    // Not inlined: what calls it is built for size.
+    #[inline(never)]
     pub fn pack(
         &mut self,
         words: &[[u8; 2]],

@@ -64,6 +64,8 @@ impl Dvxplorer {
     /// Decodes words into `events`, until the words are used up, fewer than eight places are left, or the clock is set to zero.
     /// Times are `offset_us` later than the camera's, and never earlier than `reached_us`, which they move on. With `swap_xy`, columns are
     /// sent as rows.
+    // Not inlined: what calls it is built for size.
+    #[inline(never)]
     pub fn pack(
         &mut self,
         words: &[[u8; 2]],

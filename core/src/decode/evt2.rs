@@ -47,6 +47,8 @@ impl Evt2 {
     }
 
     /// Takes in as many words as there are places, and packs their events. Returns the number of words and of events.
+    // Not inlined: what calls it is built for size.
+    #[inline(never)]
     pub fn pack(&mut self, words: &[[u8; 4]], places: &mut [PackedEvent]) -> (usize, usize) {
         let words = &words[..words.len().min(places.len())];
         let (mut taken, mut filled) = (0, 0);
@@ -118,8 +120,8 @@ const fn is_event(word: u32) -> bool {
 
 #[inline(always)]
 const fn pack(word: u32, base_us: u32) -> PackedEvent {
-    let (x, y) = ((word >> 11 & 0x7ff) as u16, (word & 0x7ff) as u16);
-    PackedEvent::new(base_us | word >> 22 & 0x3f, x, y, polarity(word >> PAYLOAD_BITS != 0))
+    let (x, y) = (word >> 11 & 0x7ff, word & 0x7ff);
+    PackedEvent::of_pixel(base_us | word >> 22 & 0x3f, (word >> PAYLOAD_BITS) << 31 | y << 16 | x)
 }
 
 #[cfg(test)]

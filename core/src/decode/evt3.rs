@@ -1,10 +1,13 @@
 //! Prophesee EVT 3.0: 16-bit words that only say what changed.
 
 use super::polarity;
-use crate::event::{Event, Polarity};
+use crate::event::{Event, PackedEvent, Polarity};
 
 /// Span of the 12-bit halves of the 24-bit clock, in their own units.
 const HALF_CLOCK: u16 = 1 << 12;
+
+/// Most events that one word stands for: a vector.
+const VECTOR_EVENTS: usize = 12;
 
 /// Decoder of EVT 3.0 words (Prophesee, "EVT 3.0 format").
 #[derive(Clone, Debug)]
@@ -72,6 +75,30 @@ impl Evt3 {
             0x7 | 0xa | 0xe | 0xf => {}
             _ => self.unknown += 1,
         }
+    }
+
+    /// Packs the events of words, `base_us` later than the words say, as far as the places are sure to do: one word may be
+    /// twelve events. Returns the number of words and of events.
+    // Not inlined: what calls it is built for size.
+    #[inline(never)]
+    pub fn pack(
+        &mut self,
+        words: &[[u8; 2]],
+        base_us: u64,
+        places: &mut [PackedEvent],
+    ) -> (usize, usize) {
+        let words = &words[..words.len().min(places.len() / VECTOR_EVENTS)];
+        let (count, mut places) = (places.len(), places.iter_mut());
+        for word in words {
+            self.decode(u16::from_le_bytes(*word), |event| {
+                if let Some(place) = places.next() {
+                    // Times that no sensor reaches may wrap.
+                    let t_us = base_us.wrapping_add(event.t_us);
+                    *place = PackedEvent::pack(&Event { t_us, ..event });
+                }
+            });
+        }
+        (words.len(), count - places.len())
     }
 
     #[inline]

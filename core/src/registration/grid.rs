@@ -2,9 +2,12 @@
 
 use super::slice::SlicePoint;
 use crate::limits::{GRID_CELLS_SIDE, SLICE_POINTS};
+use crate::math::larger;
 
 /// Smallest cell in pixels: finer cells would be empty.
 const LEAST_CELL_PX: f32 = 3.5;
+/// More than what rounding makes of the way to the edge of a cell, in pixels.
+const ROUNDING_PX: f32 = 0.01;
 const SIDE: usize = GRID_CELLS_SIDE;
 /// A grid for each polarity.
 const CELLS: usize = 2 * SIDE * SIDE;
@@ -90,43 +93,66 @@ impl Grid {
         (((at_px + self.half_px) * self.per_px) as usize).min(SIDE - 1)
     }
 
-    /// Index of the nearest point to `query`, and its squared distance. Ties go to the point first visited, which
-    /// depends on the points alone. Cost: about 4 runs of cells and 15 distances of 12 instructions.
+    /// Index of the nearest point to `query`, and its squared distance. Ties go to the upper one, then to the one on the
+    /// left, so that they depend neither on the cells nor on the sense of rotation.
+    /// Cost: about 3 rows of cells and 10 distances of 12 instructions.
     #[must_use]
     pub fn nearest(&self, query: SlicePoint) -> Option<(usize, f32)> {
         let (column, row) = (self.cell(query.x_px), self.cell(query.y_px));
+        let above_px = query.y_px + self.half_px - row as f32 * self.cell_px;
         let bank = if query.on { SIDE } else { 0 };
         let query = self.metric.place(&query);
         let reach_px = self.metric.reach_px;
         let mut best = (usize::MAX, reach_px * reach_px);
+        // The cell and those around it, as far as they may hold something nearer; then ring after ring.
+        let (left, right) = (column.saturating_sub(1), (column + 1).min(SIDE - 1));
+        self.visit(query, bank + row, (left, right), &mut best);
+        let may_be_nearer = |apart_px: f32, best: (usize, f32)| {
+            let least_px = larger(apart_px - ROUNDING_PX, 0.0);
+            least_px * least_px <= best.1
+        };
+        if row > 0 && may_be_nearer(above_px, best) {
+            self.visit(query, bank + row - 1, (left, right), &mut best);
+        }
+        if row + 1 < SIDE && may_be_nearer(self.cell_px - above_px, best) {
+            self.visit(query, bank + row + 1, (left, right), &mut best);
+        }
         let rings = (reach_px * self.per_px) as usize + 1;
-        // The cell and those around it, then ring after ring.
-        for ring in 1..=rings {
+        for ring in 2..rings + 1 {
             // Every cell of this ring is at least ring - 1 cells away.
             let closest = (ring - 1) as f32 * self.cell_px;
             if closest * closest > best.1 {
                 break;
             }
-            let (left, right) = (column.wrapping_sub(ring), column + ring);
-            let (first, last) = (row.wrapping_sub(ring), row + ring);
-            let mut y = if first < SIDE { first } else { 0 };
-            while y <= last && y < SIDE {
-                if ring == 1 || y == first || y == last {
-                    let left = if left < SIDE { left } else { 0 };
-                    self.visit(query, bank + y, (left, right.min(SIDE - 1)), &mut best);
-                } else {
-                    if left < SIDE {
-                        self.visit(query, bank + y, (left, left), &mut best);
-                    }
-                    if right < SIDE {
-                        self.visit(query, bank + y, (right, right), &mut best);
-                    }
-                }
-                y += 1;
-            }
+            self.visit_ring(query, (column, row, bank), ring, &mut best);
         }
         let index = self.order.get(best.0)?;
         Some((usize::from(*index), best.1))
+    }
+
+    /// Looks at the cells so many cells away.
+    fn visit_ring(
+        &self,
+        query: [f32; 3],
+        (column, row, bank): (usize, usize, usize),
+        ring: usize,
+        best: &mut (usize, f32),
+    ) {
+        let (left, right) = (column.wrapping_sub(ring), column + ring);
+        let (first, last) = (row.wrapping_sub(ring), row + ring);
+        for y in row.saturating_sub(ring)..(last + 1).min(SIDE) {
+            if y == first || y == last {
+                let left = if left < SIDE { left } else { 0 };
+                self.visit(query, bank + y, (left, right.min(SIDE - 1)), best);
+            } else {
+                if left < SIDE {
+                    self.visit(query, bank + y, (left, left), best);
+                }
+                if right < SIDE {
+                    self.visit(query, bank + y, (right, right), best);
+                }
+            }
+        }
     }
 
     /// Looks at the cells of a row from the first to the second column.
@@ -138,17 +164,26 @@ impl Grid {
         best: &mut (usize, f32),
     ) {
         let (from, to) = (row * SIDE + from, row * SIDE + to + 1);
-        let mut at = self.starts.get(from).copied().map_or(0, usize::from);
+        let start = self.starts.get(from).copied().map_or(0, usize::from);
         let end = self.starts.get(to).copied().map_or(0, usize::from);
-        while at < end {
-            let Some([x, y, t]) = self.places.get(at) else { return };
+        let Some(places) = self.places.get(start..end) else { return };
+        for (at, [x, y, t]) in (start..).zip(places) {
             let (dx, dy, dt) = (x - query[0], y - query[1], t - query[2]);
             let distance2 = dx * dx + dy * dy + dt * dt;
-            if distance2 < best.1 {
+            if distance2 < best.1 || distance2 == best.1 && self.precedes(at, best.0) {
                 *best = (at, distance2);
             }
-            at += 1;
         }
+    }
+
+    /// Whether a point comes before another one where both are as near.
+    #[cold]
+    fn precedes(&self, at: usize, other: usize) -> bool {
+        let key = |at: usize| Some((self.places.get(at)?, self.order.get(at)?));
+        let (Some(([x, y, _], order)), Some(([x2, y2, _], order2))) = (key(at), key(other)) else {
+            return false;
+        };
+        y < y2 || y == y2 && (x < x2 || x == x2 && order < order2)
     }
 }
 

@@ -3,7 +3,6 @@
 use super::coherence::Phasor;
 use super::disc::Disc;
 use super::extraction::Found;
-use super::heat::CellGrid;
 use super::winding::{Explainer, Winding};
 use crate::math::{TAU, sqrt};
 
@@ -15,6 +14,11 @@ const LEAST_SHARE: f32 = 0.6;
 const LEAST_LEAD: f32 = 0.2;
 /// Fewest phasors that a rotation is believed on.
 pub const LEAST_PHASORS: usize = 12;
+/// The same three where the phasors are single events, noise among them: their number, the share that is explained, and the power
+/// over what chance would reach.
+const LEAST_EVENTS: usize = 64;
+const LEAST_EVENT_SHARE: f32 = 0.45;
+const EVENTS_OVER_CHANCE: f32 = 1.5;
 /// Farthest axis from the disc's centre, in radii.
 const MOST_OFF_CENTRE: f32 = 0.7;
 
@@ -26,24 +30,27 @@ pub fn inside(phasor: &Phasor, part: &Disc) -> bool {
 }
 
 /// A rotor, when the winding is one to be believed.
-pub fn believe(explainer: &Explainer, line_hz: f32, grid: CellGrid) -> Option<Found> {
+pub fn believe(explainer: &Explainer, line_hz: f32) -> Option<Found> {
     let (region, total, part, winding) = explainer.result();
     let Winding { share, share_in_step, windings, over_chance, .. } = winding;
     let thinned = total as f32 / region.len().max(1) as f32;
     let axis = Disc { x_px: winding.x_px, y_px: winding.y_px, radius_px: 0.0 };
     let off_centre = MOST_OFF_CENTRE * part.radius_px;
+    let (least, least_share, least_over) = match explainer.cell_px() {
+        Some(_) => (LEAST_PHASORS, LEAST_SHARE, 1.0),
+        None => (LEAST_EVENTS, LEAST_EVENT_SHARE, EVENTS_OVER_CHANCE),
+    };
     let believed = windings != 0
-        && region.len() >= LEAST_PHASORS
-        && over_chance > 1.0
-        && share >= LEAST_SHARE
+        && region.len() >= least
+        && over_chance > least_over
+        && share >= least_share
         && share - share_in_step >= LEAST_LEAD
         && part.distance2(&axis) <= off_centre * off_centre;
     let radius_px = rim(region, &axis);
-    let cell_px = grid.cell_px();
-    // Both polarities of a cell are phasors of their own.
-    let covered_px2 = 0.5 * total as f32 * cell_px * cell_px;
     let disc_px2 = core::f32::consts::PI * radius_px * radius_px;
-    (believed && covered_px2 > LEAST_COVER * disc_px2).then(|| Found {
+    // Both polarities of a cell are phasors of their own.
+    let covers = |cell_px: f32| 0.5 * total as f32 * cell_px * cell_px > LEAST_COVER * disc_px2;
+    (believed && explainer.cell_px().is_none_or(covers)).then(|| Found {
         disc: Disc { radius_px, ..axis },
         omega_rad_s: line_hz * TAU / windings as f32,
         windings: windings.unsigned_abs(),

@@ -5,7 +5,7 @@ use crate::event::{Geometry, PackedEvent};
 /// Side of a cell as a power of two: 4 pixels, as in the paper.
 const CELL_LOG2: u8 = 2;
 
-/// Counts of all events, kept or thinned, by cell; cells of a sliding window fade with it.
+/// Counts of all events by cell; they fade as time goes on.
 #[derive(Debug)]
 pub struct HeatMap<'m> {
     counts: &'m mut [u16],
@@ -165,15 +165,14 @@ impl<'m> HeatMap<'m> {
         &self.counts[..self.grid.len().min(self.counts.len())]
     }
 
-    /// Counts events of pixels on the sensor; a cell saturates at 65 535.
-    // A function of its own, so that all it needs stays in registers.
-    #[inline(never)]
-    pub fn add(&mut self, events: &[PackedEvent]) {
-        let columns = self.grid.columns as u32;
-        // One that the compiler knows spares a third of the instructions.
-        match self.grid.cell_log2 {
-            CELL_LOG2 => add(self.counts, columns, CELL_LOG2, events),
-            coarser => add(self.counts, columns, coarser, events),
+    /// Counts an event of a pixel on the sensor that stands for 2^`weight_log2`; a cell saturates at 65 535.
+    #[inline]
+    pub fn count(&mut self, event: PackedEvent, weight_log2: u8) {
+        let CellGrid { columns, cell_log2, .. } = self.grid;
+        let (x, y) = (event.pixel() & 0xffff, event.pixel() >> 16);
+        let cell = (y >> cell_log2) * columns as u32 + (x >> cell_log2);
+        if let Some(count) = self.counts.get_mut(cell as usize) {
+            *count = count.saturating_add(1 << weight_log2);
         }
     }
 
@@ -193,16 +192,5 @@ impl<'m> HeatMap<'m> {
     /// Forgets everything.
     pub fn clear(&mut self) {
         self.counts.fill(0);
-    }
-}
-
-#[inline(always)]
-fn add(counts: &mut [u16], columns: u32, cell_log2: u8, events: &[PackedEvent]) {
-    for event in events {
-        let (x, y) = (event.pixel() & 0xffff, event.pixel() >> 16);
-        let cell = (y >> cell_log2) * columns + (x >> cell_log2);
-        if let Some(count) = counts.get_mut(cell as usize) {
-            *count = count.saturating_add(1);
-        }
     }
 }

@@ -2,6 +2,7 @@
 
 use heapless::Vec;
 
+use super::visits::Chance;
 use crate::math::{Turn, sqrt};
 use crate::order::sort_few;
 
@@ -55,9 +56,9 @@ impl Spectrum {
         &mut self.bins[0]
     }
 
-    /// Transforms the histogram and finds its peaks. `banks` is the variance of the summed power at chance.
+    /// Transforms the histogram and finds its peaks. `chance` is what the summed power would be without any.
     /// Cost: about 300 000 instructions.
-    pub fn lines(&mut self, banks: usize, window_us: u32) -> Lines {
+    pub fn lines(&mut self, chance: Chance, window_us: u32) -> Lines {
         let mut lines = Lines::new();
         let bins = self.bins.as_flattened_mut().first_chunk_mut::<PADDED>();
         let Some(bins) = bins else { return lines };
@@ -79,8 +80,8 @@ impl Spectrum {
             let right = low(sample + 1, sample + 1 + FLANK);
             let flank = left.max(right);
             // Where events come in clumps, chance grows with them.
-            let banks = banks.max(1) as f32;
-            let sigma = sqrt(banks) * (1.0 + flank.max(0.0) / banks);
+            let sigma =
+                sqrt(chance.variance.max(1.0)) * (1.0 + flank.max(0.0) / chance.mean.max(1.0));
             let sigmas = (here - flank) / sigma;
             if sigmas < LEAST_SIGMAS {
                 continue;
@@ -134,7 +135,7 @@ mod tests {
         for periods in 1..15_usize {
             spectrum.lags()[62 * periods] = 100.0 * (15 - periods) as f32 / 15.0;
         }
-        let lines = spectrum.lines(100, 150_000);
+        let lines = spectrum.lines(Chance { mean: 100.0, variance: 100.0 }, 150_000);
         // The middle of a bin is half a bin later.
         let expected_hz = 1e6 / 150_000.0 * LAGS as f32 / 62.0;
         assert!(lines.iter().any(|line| (line.hz / expected_hz - 1.0).abs() < 0.02), "{lines:?}");
@@ -142,6 +143,7 @@ mod tests {
 
     #[test]
     fn an_empty_histogram_has_no_lines() {
-        assert!(Spectrum::EMPTY.lines(0, 150_000).is_empty());
+        let mut spectrum = Spectrum::EMPTY;
+        assert!(spectrum.lines(Chance::default(), 150_000).is_empty());
     }
 }

@@ -48,8 +48,17 @@ pub struct Visits {
     times: [u16; VISITS],
     /// Next cell to make pairs of, or to map.
     cell: usize,
-    /// Cells and polarities that pairs were made of.
-    banks: usize,
+    /// What unrelated events would add up to.
+    chance: Chance,
+}
+
+/// What the power of unrelated events adds up to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Chance {
+    /// Its mean.
+    pub mean: f32,
+    /// Its variance.
+    pub variance: f32,
 }
 
 impl Default for Visits {
@@ -60,7 +69,7 @@ impl Default for Visits {
             ends: [0; VISIT_CELLS],
             times: [0; VISITS],
             cell: 0,
-            banks: 0,
+            chance: Chance::default(),
         }
     }
 }
@@ -92,7 +101,7 @@ impl Visits {
     pub fn clear(&mut self, grid: CellGrid) {
         self.grid = grid;
         self.cell = 0;
-        self.banks = 0;
+        self.chance = Chance::default();
         self.ends.fill(0);
     }
 
@@ -166,24 +175,26 @@ impl Visits {
         self.times.get(start..usize::from(self.ends[cell])).unwrap_or(&[])
     }
 
-    /// Adds the time differences of some cells to the histogram; `true` once all are in it.
-    pub fn step(&mut self, lags: &mut [f32; LAGS]) -> bool {
+    /// Adds the time differences of some cells to the histogram; `true` once all are in it. A cell and polarity counts as much as
+    /// it has events, up to `most_weight`: 1 for all alike.
+    pub fn step(&mut self, lags: &mut [f32; LAGS], most_weight: usize) -> bool {
         let mut pairs = 0;
         while self.cell < VISIT_CELLS && pairs < PAIRS_A_STEP {
-            pairs += 8 + self.pair(self.cell, lags);
+            pairs += 8 + self.pair(self.cell, lags, most_weight);
             self.cell += 1;
         }
         self.cell >= VISIT_CELLS
     }
 
     /// Adds the time differences of one cell; returns how many.
-    fn pair(&mut self, cell: usize, lags: &mut [f32; LAGS]) -> usize {
+    fn pair(&mut self, cell: usize, lags: &mut [f32; LAGS], most_weight: usize) -> usize {
         let times = self.of(cell);
         let stride = times.len().div_ceil(MOST_IN_CELL).max(1);
         let kept = || times.iter().copied().step_by(stride);
         let on = kept().filter(|time| time & 1 == 1).count();
         let counts = [kept().count() - on, on];
-        let weights = counts.map(|count| 1.0 / count.max(1) as f32);
+        let weight = |count: usize| count.min(most_weight) as f32;
+        let weights = counts.map(|count| weight(count) / count.max(1) as f32);
         for (index, late) in kept().enumerate() {
             let weight = weights[usize::from(late & 1)];
             for early in kept().take(index) {
@@ -196,14 +207,17 @@ impl Visits {
                 }
             }
         }
-        self.banks += counts.iter().filter(|count| **count > 1).count();
+        for weight in counts.into_iter().filter(|count| *count > 1).map(weight) {
+            self.chance.mean += weight;
+            self.chance.variance += weight * weight;
+        }
         counts[0] * counts[0] / 2 + counts[1] * counts[1] / 2
     }
 
-    /// Cells and polarities that pairs were made of: the variance of the summed power at chance.
+    /// What the summed power would be if the events had nothing to do with each other.
     #[must_use]
-    pub const fn banks(&self) -> usize {
-        self.banks
+    pub const fn chance(&self) -> Chance {
+        self.chance
     }
 
     /// Writes how often each cell is visited as weights, row by row: the root, so that what passes slowly still counts.
@@ -349,6 +363,7 @@ fn smooth(grid: CellGrid, cells: &mut [u8], reach: usize) {
         let rows_above = reach.min(row) + 1;
         // Sums of the columns around the cell at hand, and of all of them.
         let (mut sums, mut oldest, mut around) = ([0; 2 * MOST_REACH + 1], 0, 0);
+        #[expect(clippy::needless_range_loop, reason = "the columns run on past the last cell")]
         for column in 0..columns + reach {
             let mut sum = 0;
             if column < columns {

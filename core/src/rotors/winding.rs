@@ -78,6 +78,8 @@ pub struct Explainer {
     /// Phasors before thinning.
     total: usize,
     disc: Disc,
+    /// Side of the cells that the phasors come from; `None`: they are single events.
+    cell_px: Option<f32>,
     /// Most windings that the cells let tell apart.
     most: usize,
     from: (f32, f32),
@@ -97,8 +99,31 @@ impl Explainer {
         disc: Disc,
         cell_px: f32,
     ) {
-        self.most = ((MOST_IN_CELL_RAD * disc.radius_px / cell_px) as usize).min(MOST_WINDINGS);
         (self.region, self.total) = collect(phasors, inside);
+        self.cell_px = Some(cell_px);
+        self.most = ((MOST_IN_CELL_RAD * disc.radius_px / cell_px) as usize).min(MOST_WINDINGS);
+        self.begin(disc);
+    }
+
+    /// Starts over with single events as phasors, to be [added](Self::add): where there are too few for a phase in each cell.
+    pub fn start_events(&mut self, disc: Disc) {
+        self.region.clear();
+        self.cell_px = None;
+        self.most = MOST_WINDINGS;
+        self.begin(disc);
+    }
+
+    /// Adds an event, while there is room.
+    pub fn add(&mut self, event: Phasor) {
+        self.region.push(event).ok();
+    }
+
+    /// All events were added, out of so many before thinning.
+    pub const fn collected(&mut self, total: usize) {
+        self.total = total;
+    }
+
+    fn begin(&mut self, disc: Disc) {
         self.disc = disc;
         self.from = (disc.x_px, disc.y_px);
         self.spacing_px = COARSE_SPACING * disc.radius_px;
@@ -129,6 +154,12 @@ impl Explainer {
             (self.row, self.column) = (-1, -1);
         }
         self.halvings > HALVINGS
+    }
+
+    /// Side of the cells that the phasors come from; `None` where they are single events.
+    #[must_use]
+    pub const fn cell_px(&self) -> Option<f32> {
+        self.cell_px
     }
 
     /// The phasors, their number before thinning, the disc they come from, and what explains them best.

@@ -298,13 +298,14 @@ impl Measurement {
         }
         let scan = harmonics(angular);
         let standing = scan.second_share / scan.share.max(1e-3);
+        let rival = scan.rival_share / scan.share.max(1e-3);
         self.evidence.scan_rad_s = (scan.best != 0).then(|| self.line_hz * TAU / scan.best as f32);
         self.evidence.scan_score = Some(scan.share * scan.share * polar.len() as f32);
-        self.evidence.scan_standing = Some(standing);
+        self.evidence.scan_standing = Some(rival);
         if scan.best == 0 {
             return self.refuse(Reason::NoRotation);
         }
-        if standing > DOUBTFUL && self.doubt.is_none() {
+        if rival > DOUBTFUL && self.doubt.is_none() {
             self.doubt = Some(Doubt::new(self.disc, line_hz));
             self.stage = Stage::Doubt;
             return;

@@ -78,6 +78,10 @@ pub struct Harmonics {
     pub share: f32,
     /// The same for the next best: near `share` where the pattern stands (flicker, vibration) or the centre is off.
     pub second_share: f32,
+    /// The same for the best that could be taken for it about another centre. Not all directions in step, nor twice the
+    /// harmonic: those two keep step with fast blades where a pixel that has just fired misses the next edge, so that the
+    /// events of a rotor show where its blades were when the pixels first fired.
+    pub rival_share: f32,
 }
 
 /// Adds events to a look at all harmonics from -16 to 16 at one frequency in Hz. Cost: about 700 instructions an event.
@@ -109,19 +113,26 @@ pub fn scan(angular: &mut AngularSums, track: &[PolarEvent], disc: Disc, line_hz
 /// Which harmonics of a [`scan`] keep step.
 #[must_use]
 pub fn harmonics(angular: &AngularSums) -> Harmonics {
+    let mut shares = [0.0_f32; TERMS];
     let mut found = Harmonics::default();
-    for term in 0..TERMS {
+    for (term, share) in shares.iter_mut().enumerate() {
         let mut pattern = Pattern { counts: angular.counts, ..Pattern::default() };
         for (sum, bank) in pattern.sums.iter_mut().zip(&angular.sums) {
             *sum = bank[term];
         }
-        let share = pattern.coherence();
-        if share > found.share {
+        *share = pattern.coherence();
+        if *share > found.share {
             found.second_share = found.share;
-            found.share = share;
+            found.share = *share;
             found.best = term as i32 - MOST_HARMONIC as i32;
         } else {
-            found.second_share = found.second_share.max(share);
+            found.second_share = found.second_share.max(*share);
+        }
+    }
+    for (term, share) in shares.into_iter().enumerate() {
+        let harmonic = term as i32 - MOST_HARMONIC as i32;
+        if ![0, found.best, 2 * found.best].contains(&harmonic) {
+            found.rival_share = found.rival_share.max(share);
         }
     }
     found

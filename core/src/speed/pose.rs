@@ -18,10 +18,11 @@ use heapless::Vec;
 
 use super::baseline::Estimate;
 use super::path::{Knot, Moving, Path};
+use super::polar::Annulus;
 use super::statistics::student_over_normal;
 use super::trend::{Point, Trend};
 use crate::limits::MAX_KNOTS;
-use crate::math::{TAU, Turn, TurnRate, quick_sqrt, sqrt};
+use crate::math::{TAU, Turn, TurnRate, larger, quick_sqrt, sqrt};
 use crate::rotors::Disc;
 use crate::store::{Even, Window};
 use blocks::{
@@ -79,6 +80,14 @@ impl Sums {
         low: Template::EMPTY,
         high: Template::EMPTY,
     };
+
+    /// Share of the events in step with the template of the round before.
+    fn in_step(&self) -> f32 {
+        let (in_step, count) = self.blocks.iter().fold((0.0, 0.0), |(in_step, count), block| {
+            (in_step + block.share() * block.count(), count + block.count())
+        });
+        in_step / larger(count, 1.0)
+    }
 }
 
 /// What is found of the pose.
@@ -201,6 +210,12 @@ impl Pose {
         self.harmonic > self.first_harmonic
     }
 
+    /// Blocks in a symmetry period, 0 when blocks are whole periods.
+    #[must_use]
+    pub const fn in_period(&self) -> usize {
+        self.in_period
+    }
+
     /// Rotor's events in the window.
     #[must_use]
     pub const fn events(&self) -> usize {
@@ -229,8 +244,9 @@ impl Pose {
     /// template anew; `true` once all rounds are done. Cost: about 180 instructions an event.
     pub fn step(&mut self, window: &Window<'_>, sums: &mut Sums, even: &mut Even) -> bool {
         if !self.started {
-            let disc = Moving::new(self.disc, &self.path, window);
-            if even.weigh(window, |event| disc.place(event).is_some()) {
+            // The axis is thought to be at rest yet.
+            let annulus = Annulus::of(self.disc);
+            if even.weigh(window, |event| annulus.place(event).is_some()) {
                 self.started = true;
                 self.events = even.count();
                 self.even_share = even.share();
@@ -255,8 +271,12 @@ impl Pose {
     fn end_round(&mut self, sums: &mut Sums) -> bool {
         let fine = self.schedule.is_fine();
         let at_low = sums.low.coherence(&sums.counts);
-        let astray = at_low < SHARP_COHERENCE * self.first_coherence;
-        if fine && astray && self.harmonic > self.first_harmonic {
+        let blurred = at_low < SHARP_COHERENCE * self.first_coherence;
+        // Too few events for so high a harmonic: path and template chase each other.
+        let apart = self.schedule.phase() >= Phase::All
+            && self.phases.is_some()
+            && sums.in_step() < SHARP_COHERENCE * at_low;
+        if fine && (blurred || apart) && self.harmonic > self.first_harmonic {
             self.step_back();
             return false;
         }
@@ -316,7 +336,9 @@ impl Pose {
         let even = (events as f32 * self.even_share) as usize;
         let most = (even / BLOCK_EVENTS).min(self.schedule.blocks());
         let most = most.clamp(LEAST_BLOCKS, MAX_KNOTS - 1) as f32;
-        let shortest = (self.window_us / most).max(SHORTEST_BLOCK_US);
+        // In a short window a hand does little, and a trend still needs its points.
+        let still_us = SHORTEST_BLOCK_US.min(self.window_us / (2 * LEAST_BLOCKS) as f32);
+        let shortest = (self.window_us / most).max(still_us);
         let split = libm::floorf((self.period_us / shortest).min(MOST_IN_PERIOD));
         let step_us = if split >= 1.0 {
             self.period_us / split

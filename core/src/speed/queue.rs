@@ -63,12 +63,12 @@ fn paces(window: &Window<'_>, segment: usize) -> (f32, u32) {
 mod tests {
     use super::*;
     use crate::event::{PackedEvent, Polarity};
-    use crate::store::{SEGMENTS, Store};
+    use crate::store::{MOST_SEGMENTS, MOST_SPARE, Store};
 
     /// The stretch of a window of events whose distances are told in nanoseconds.
     fn of(distance_ns: impl Fn(u64) -> u64) -> f32 {
-        let mut memory = vec![StoredEvent::default(); SEGMENTS * 2_048];
-        let mut store = Store::new(&mut memory, 25_000);
+        let mut memory = vec![StoredEvent::default(); MOST_SEGMENTS * 2_048];
+        let mut store = Store::new(&mut memory, MOST_SPARE, 25_000);
         let mut t_ns = 0;
         for index in 0_u64.. {
             t_ns += distance_ns(index);
@@ -79,7 +79,7 @@ mod tests {
             while t_us >= store.open_end_us() {
                 store.close_segment();
             }
-            store.push(&[PackedEvent::new(t_us as u32, 1, 1, Polarity::On)]);
+            store.push(&[PackedEvent::new(t_us as u32, 1, 1, Polarity::On)], 0, |_, _| {});
         }
         stretch(&store.window(6, u64::MAX))
     }

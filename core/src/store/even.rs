@@ -34,13 +34,21 @@ impl Even {
 
     /// Weighs the next segment; `true` once all segments were.
     pub fn weigh(&mut self, window: &Window<'_>, inside: impl Fn(StoredEvent) -> bool) -> bool {
+        // In registers: 32 bits hold what a segment stands for.
+        let (mut count, mut weight, mut coarsest_log2) = (0, 0_u32, self.coarsest_log2);
         for event in window.segment(usize::from(self.segment)) {
             if inside(*event) {
-                self.count += 1;
-                self.weight = self.weight.saturating_add(1 << event.weight_log2());
-                self.coarsest_log2 = self.coarsest_log2.max(event.weight_log2());
+                let weight_log2 = event.weight_log2();
+                count += 1;
+                weight = weight.wrapping_add(1 << weight_log2);
+                if weight_log2 > coarsest_log2 {
+                    coarsest_log2 = weight_log2;
+                }
             }
         }
+        self.count += count;
+        self.weight = self.weight.saturating_add(weight);
+        self.coarsest_log2 = coarsest_log2;
         self.weighed = self.advance(window);
         self.weighed
     }

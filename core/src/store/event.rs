@@ -22,7 +22,8 @@ const POLARITY_BIT: u16 = 0x8000;
 const ROW_BITS: u16 = 11;
 const ROW_MASK: u16 = (1 << ROW_BITS) - 1;
 const WEIGHT_MASK: u16 = 0xF << ROW_BITS;
-pub(super) const MOST_WEIGHT_LOG2: u8 = 15;
+/// Most events that one stands for, as a power of two.
+pub(crate) const MOST_WEIGHT_LOG2: u8 = 15;
 
 impl StoredEvent {
     #[inline]

@@ -2,14 +2,14 @@
 
 use super::event::MOST_WEIGHT_LOG2;
 use super::open::{as_they_came, level};
-use super::{SEGMENTS, Segment, Store};
+use super::{MOST_SEGMENTS, Segment, Store};
 
 impl Store<'_> {
     /// Makes segments longer, keeping what is stored: each new segment keeps the burst and the octaves of the first old one in
     /// it, and of the rest every event that stands for as many as the new reservoir's stride says.
     /// `segment_us` is at least the length so far. Cost: two passes over the store.
     pub fn lengthen(&mut self, segment_us: u32) {
-        let old: [Segment; SEGMENTS] = core::array::from_fn(|i| self.segments[self.slot(i)]);
+        let old: [Segment; MOST_SEGMENTS] = core::array::from_fn(|i| self.segments[self.slot(i)]);
         let old_us = u64::from(self.segment_us);
         let closed = (self.closed as u64 * old_us / u64::from(segment_us)) as usize;
         // Reading runs ahead of writing: new segments start no earlier than old ones and hold no more events.
@@ -73,7 +73,7 @@ impl Store<'_> {
     /// An empty segment whose stride lets the reservoir hold what comes after the first burst and before `end_us`.
     fn plan_merge(
         &self,
-        old: &[Segment; SEGMENTS],
+        old: &[Segment; MOST_SEGMENTS],
         (from, index): (usize, usize),
         end_us: i32,
     ) -> Segment {

@@ -27,54 +27,89 @@ pub(super) struct Segment {
 }
 
 impl Store<'_> {
-    /// Takes in events of the open segment.
+    /// Takes in events of the open segment, each of which stands for 2^`weight_log2`: the others were thinned before. `kept` hears
+    /// of those that it keeps, and of how many each stands for then, as a power of two.
     // A function of its own, so that all it needs stays in registers.
     #[inline(never)]
-    pub fn push(&mut self, events: &[PackedEvent]) {
+    pub fn push(
+        &mut self,
+        events: &[PackedEvent],
+        weight_log2: u8,
+        mut kept: impl FnMut(PackedEvent, u8),
+    ) {
         let slot = self.slot(self.closed);
-        let mut rest = events;
-        let mut kept = 0;
-        loop {
-            let skip = self.segments[slot].skip as usize;
-            let Some((event, later)) = rest.get(skip..).and_then(<[_]>::split_first) else { break };
-            self.keep(slot, *event);
-            kept += 1;
-            rest = later;
+        let skip = self.segments[slot].skip;
+        // What is to be passed over, in these events, and what is left of it that is less than one stands for.
+        let (mut next, mut rest) = ((skip >> weight_log2) as usize, skip);
+        let mut count = 0;
+        while next < events.len() {
+            if self.segments[slot].len >= self.capacity {
+                self.make_room(slot);
+            }
+            let segment = &mut self.segments[slot];
+            let step_log2 = segment.stride_log2;
+            let stride_log2 = step_log2.saturating_sub(weight_log2);
+            let stands_log2 = step_log2.max(weight_log2);
+            let base = slot * self.capacity;
+            let places = self.events.get_mut(base + segment.len..base + self.capacity);
+            let places = places.unwrap_or_default();
+            // As many as go by the same step.
+            let every = events[next..].iter().step_by(1 << stride_log2);
+            let before = count;
+            for (place, event) in places.iter_mut().zip(every) {
+                *place = StoredEvent::store(*event, stands_log2);
+                kept(*event, stands_log2);
+                count += 1;
+            }
+            if count == before {
+                // No memory at all.
+                break;
+            }
+            segment.len += count - before;
+            next += (count - before) << stride_log2;
+            rest = (1 << step_log2) - 1;
         }
         let segment = &mut self.segments[slot];
-        segment.skip -= rest.len() as u32;
-        segment.counted += events.len() as u64;
-        self.thinned += (events.len() - kept) as u64;
+        rest &= (1 << weight_log2) - 1;
+        segment.skip = (next.saturating_sub(events.len()) as u32) << weight_log2 | rest;
+        let arrived = (events.len() as u64) << weight_log2;
+        segment.counted += arrived;
+        self.thinned += arrived - count as u64;
     }
 
-    #[inline(always)]
-    fn keep(&mut self, slot: usize, event: PackedEvent) {
-        if self.segments[slot].len == self.capacity {
-            self.thin(slot);
-        }
-        let segment = &mut self.segments[slot];
-        if let Some(place) = self.events.get_mut(slot * self.capacity + segment.len) {
-            *place = StoredEvent::store(event, segment.stride_log2);
-            segment.len += 1;
-        }
-        segment.skip = (1 << segment.stride_log2) - 1;
-    }
-
-    /// Makes room in a full segment: every other event goes, those kept stay evenly spread.
+    /// Makes room in a full segment: every other event behind the burst goes.
     #[cold]
-    fn thin(&mut self, slot: usize) {
+    fn make_room(&mut self, slot: usize) {
         let base = slot * self.capacity;
         let segment = &mut self.segments[slot];
         let first = as_they_came(self.capacity, segment.stride_log2);
         let sparser = &mut self.events[base + first..base + self.capacity];
-        let kept = sparser.len() / 2;
+        let mut kept = sparser.len();
+        while kept == sparser.len() && segment.stride_log2 < MOST_WEIGHT_LOG2 {
+            segment.stride_log2 += 1;
+            kept = thin(sparser, segment.stride_log2);
+        }
+        kept = kept.min(sparser.len().saturating_sub(1));
         self.thinned += (sparser.len() - kept) as u64;
         segment.len = first + kept;
-        segment.stride_log2 = (segment.stride_log2 + 1).min(MOST_WEIGHT_LOG2);
-        for i in 0..kept {
-            sparser[i] = sparser[2 * i].weighing(segment.stride_log2);
-        }
     }
+}
+
+/// Thins events until each stands for 2^`weight_log2` or, where it already does, for more; returns how many are left. Those that are
+/// stay evenly spread: every other one of events that all stand for half as many.
+fn thin(events: &mut [StoredEvent], weight_log2: u8) -> usize {
+    let (mut passed, mut kept, mask) = (0_u32, 0, (1_u32 << weight_log2) - 1);
+    for index in 0..events.len() {
+        let event = events[index];
+        let after = passed + (1 << event.weight_log2());
+        // The first of each stretch of so many.
+        if (passed + mask) & !mask < after {
+            events[kept] = event.weighing(weight_log2.max(event.weight_log2()));
+            kept += 1;
+        }
+        passed = after;
+    }
+    kept
 }
 
 /// Events at a segment's start that stay as they are when those behind them are thinned from one in 2^stride_log2 to half of

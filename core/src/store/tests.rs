@@ -10,18 +10,18 @@ fn fill(store: &mut Store<'_>, times: impl Iterator<Item = u64>) {
         while t_us >= store.open_end_us() {
             store.close_segment();
         }
-        store.push(&[PackedEvent::pack(&event(t_us))]);
+        store.push(&[PackedEvent::pack(&event(t_us))], 0, |_, _| {});
     }
 }
 
 fn times(store: &Store<'_>) -> Vec<i32> {
-    store.window(SEGMENTS, u64::MAX).events().map(|event| event.since(0)).collect()
+    store.window(MOST_SEGMENTS, u64::MAX).events().map(|event| event.since(0)).collect()
 }
 
 #[test]
 fn a_segment_keeps_a_dense_burst_then_thins_evenly_and_counts_all() {
-    let mut memory = [StoredEvent::default(); 64 * SEGMENTS];
-    let mut store = Store::new(&mut memory, 100_000);
+    let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
+    let mut store = Store::new(&mut memory, MOST_SPARE, 100_000);
     fill(&mut store, 0..5_000);
     let kept = times(&store);
     assert_eq!(&kept[..16], &(0..16).collect::<Vec<_>>()[..]);
@@ -34,8 +34,8 @@ fn a_segment_keeps_a_dense_burst_then_thins_evenly_and_counts_all() {
 
 #[test]
 fn a_segment_that_is_not_full_keeps_all() {
-    let mut memory = [StoredEvent::default(); 64 * SEGMENTS];
-    let mut store = Store::new(&mut memory, 100);
+    let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
+    let mut store = Store::new(&mut memory, MOST_SPARE, 100);
     fill(&mut store, 0..64);
     assert_eq!(times(&store), (0..64).collect::<Vec<_>>());
     let one = |event: StoredEvent| event.weight_log2() == 0;
@@ -44,8 +44,8 @@ fn a_segment_that_is_not_full_keeps_all() {
 
 #[test]
 fn behind_the_burst_each_octave_is_half_as_dense() {
-    let mut memory = [StoredEvent::default(); 64 * SEGMENTS];
-    let mut store = Store::new(&mut memory, 100_000);
+    let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
+    let mut store = Store::new(&mut memory, MOST_SPARE, 100_000);
     fill(&mut store, 0..5_000);
     // What a kept event stands for is what goes before the next.
     let window = store.window(1, u64::MAX);
@@ -57,8 +57,8 @@ fn behind_the_burst_each_octave_is_half_as_dense() {
 
 #[test]
 fn even_events_stand_for_the_same_number_each() {
-    let mut memory = [StoredEvent::default(); 64 * SEGMENTS];
-    let mut store = Store::new(&mut memory, 10_000);
+    let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
+    let mut store = Store::new(&mut memory, MOST_SPARE, 10_000);
     fill(&mut store, 0..60_000);
     let (window, mut even, mut kept) = (store.window(6, u64::MAX), Even::default(), Vec::new());
     let since = |event: StoredEvent| Some(event.since(0));
@@ -72,11 +72,88 @@ fn even_events_stand_for_the_same_number_each() {
 }
 
 #[test]
+fn what_is_given_up_is_counted_and_the_next_window_begins_with_the_latest() {
+    let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
+    let mut store = Store::new(&mut memory, MOST_SPARE, 1_000);
+    let mut given_up = 0;
+    for t_us in 0..12_500 {
+        while t_us >= store.open_end_us() {
+            if store.full() {
+                given_up += store.give_up(WINDOW_SEGMENTS);
+            }
+            store.close_segment();
+        }
+        store.push(&[PackedEvent::pack(&event(t_us))], 0, |_, _| {});
+    }
+    // Six are measured, 6 000 to 9 000 went, and four stand: 9 000 to 12 500.
+    assert_eq!(given_up, 3_000);
+    assert!(store.is_torn());
+    let measured = store.window(WINDOW_SEGMENTS, u64::MAX);
+    assert_eq!((measured.start_us, measured.duration_us), (0, 6_000));
+    assert!(measured.events().all(|event| (0..6_000).contains(&event.since(0))));
+    let kept = store.account(MOST_SEGMENTS).kept;
+    assert_eq!(12_500, kept + store.thinned() + given_up);
+
+    store.mend(WINDOW_SEGMENTS);
+    assert!(!store.is_torn());
+    assert_eq!((store.closed(), store.open_end_us()), (3, 13_000));
+    let next = store.window(MOST_SEGMENTS, u64::MAX);
+    assert_eq!((next.start_us, next.duration_us), (9_000, 4_000));
+    let times: Vec<i32> = next.events().map(|event| event.since(9_000)).collect();
+    assert!(times.first() == Some(&0) && times.iter().all(|t_us| (0..3_500).contains(t_us)));
+    assert!(times.windows(2).all(|pair| pair[0] < pair[1]));
+}
+
+#[test]
+fn those_that_are_kept_stand_for_all() {
+    let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
+    let mut store = Store::new(&mut memory, MOST_SPARE, 100_000);
+    let mut stands_for = 0;
+    for t_us in 0..50_000 {
+        store.push(&[PackedEvent::pack(&event(t_us))], 0, |_, weight_log2| {
+            stands_for += 1 << weight_log2
+        });
+    }
+    assert!((50_000..52_048).contains(&stands_for), "{stands_for}");
+}
+
+#[test]
+fn events_that_were_thinned_before_stand_for_those_left_out() {
+    let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
+    let mut store = Store::new(&mut memory, MOST_SPARE, 10_000);
+    // A stretch of 15 ms in which one in 8 comes, then one in 512: more than the reservoir leaves out by itself.
+    let weight_log2 = |t_us: u64| match t_us {
+        20_000..30_000 => 3,
+        30_000..35_000 => 9,
+        _ => 0,
+    };
+    for t_us in (0..60_000_u64).filter(|t_us| t_us.trailing_zeros() >= weight_log2(*t_us)) {
+        while t_us >= store.open_end_us() {
+            store.close_segment();
+        }
+        store.push(&[PackedEvent::pack(&event(t_us))], weight_log2(t_us) as u8, |_, _| {});
+    }
+    let account = store.account(6);
+    assert!(account.counted.abs_diff(60_000) < 512, "{account:?}");
+    assert_eq!(store.thinned(), account.counted - account.kept);
+    let window = store.window(6, u64::MAX);
+    let stored: u64 = window.events().map(|event| 1 << event.weight_log2()).sum();
+    assert!(stored.abs_diff(60_000) < 6_000, "{stored}");
+    let (mut even, mut times) = (Even::default(), Vec::new());
+    let since = |event: StoredEvent| Some(event.since(0));
+    while !even.step(&window, 100, since, |_, t_us| times.push(t_us)) {}
+    let gaps: Vec<i32> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    assert!(gaps.iter().all(|gap| (1..=1_536).contains(gap)), "{gaps:?}");
+    let thinned = times.iter().filter(|t_us| (20_000..35_000).contains(*t_us)).count();
+    assert!(thinned.abs_diff(times.len() / 4) <= 3, "{thinned} of {}", times.len());
+}
+
+#[test]
 fn lengthening_keeps_order_counts_and_the_first_burst() {
-    let mut memory = [StoredEvent::default(); 64 * SEGMENTS];
-    let mut store = Store::new(&mut memory, 1_000);
+    let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
+    let mut store = Store::new(&mut memory, MOST_SPARE, 1_000);
     fill(&mut store, (0..6_500).step_by(3));
-    let before = store.account(SEGMENTS);
+    let before = store.account(MOST_SEGMENTS);
     assert_eq!(store.closed(), 6);
     for segment_us in [2_000, 2_700, 5_400] {
         store.lengthen(segment_us);
@@ -84,7 +161,7 @@ fn lengthening_keeps_order_counts_and_the_first_burst() {
         assert!(kept.windows(2).all(|pair| pair[0] < pair[1]), "{kept:?}");
         assert_eq!(&kept[..4], &[0, 3, 6, 9]);
         assert!(*kept.last().unwrap_or(&0) > 6_000);
-        assert_eq!(store.account(SEGMENTS).counted, before.counted);
+        assert_eq!(store.account(MOST_SEGMENTS).counted, before.counted);
     }
     assert_eq!(store.closed(), 1);
     fill(&mut store, 6_500..40_000);

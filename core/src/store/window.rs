@@ -1,13 +1,13 @@
 //! What the store hands out: the events of a stretch of time, and where they went.
 
-use super::{SEGMENTS, Store, StoredEvent};
+use super::{MOST_SEGMENTS, Store, StoredEvent};
 
 impl Store<'_> {
     /// The window over the oldest `segments` segments (the open one counts as the last when all closed
     /// ones are taken), no longer than to `end_us`.
     #[must_use]
     pub fn window(&self, segments: usize, end_us: u64) -> Window<'_> {
-        let mut parts: [&[StoredEvent]; SEGMENTS] = [&[]; SEGMENTS];
+        let mut parts: [&[StoredEvent]; MOST_SEGMENTS] = [&[]; MOST_SEGMENTS];
         let segments = segments.min(self.closed + 1);
         for (index, part) in parts.iter_mut().enumerate().take(segments) {
             let slot = self.slot(index);
@@ -65,7 +65,7 @@ impl Account {
 /// The stored events of a stretch of time, in time order.
 #[derive(Clone, Copy, Debug)]
 pub struct Window<'a> {
-    parts: [&'a [StoredEvent]; SEGMENTS],
+    parts: [&'a [StoredEvent]; MOST_SEGMENTS],
     /// Sensor time at which the window starts, in microseconds.
     pub start_us: u64,
     /// Length in microseconds.

@@ -8,7 +8,7 @@ use crate::order::sort_few;
 use crate::reading::{Evidence, Frame, Reading, Reason, RotorReading, Status};
 use crate::rotors::Disc;
 use crate::speed::measurement::Outcome;
-use crate::store::{SPARE_SEGMENTS, WINDOW_SEGMENTS};
+use crate::store::WINDOW_SEGMENTS;
 
 /// Windows that an adapting window steps through.
 const WINDOWS_US: [u32; 9] = [
@@ -22,8 +22,6 @@ const WINDOWS_US: [u32; 9] = [
     1_600_000,
     LONGEST_WINDOW_US,
 ];
-/// Segments by which the window moves on from reading to reading: 50 ms of 150.
-const HOP_SEGMENTS: usize = 2;
 /// Readings until the whole image is searched again, while a rotor is in view that is not locked.
 const SEARCH_AGAIN: u8 = 2;
 /// Fewest events in a window that are looked at.
@@ -32,8 +30,6 @@ const LEAST_EVENTS: u64 = 300;
 const MOST_LOST: f32 = 0.5;
 /// Standard deviation of a gyro's zero-rate offset in rad/s, with the offset calibrated on a still camera.
 const GYRO_OFFSET_RAD_S: f32 = 3e-3;
-
-const _: () = assert!(SPARE_SEGMENTS >= HOP_SEGMENTS);
 
 impl Tachometer<'_> {
     /// Turns the outcomes into a reading and moves the window on.
@@ -74,7 +70,7 @@ impl Tachometer<'_> {
 
     /// Chooses the next window: longer while a rotor or the search needs it, else a hop further.
     fn move_on(&mut self, status: Status) {
-        self.window_segments = 0;
+        let measured = core::mem::take(&mut self.window_segments);
         self.job = Job::Idle;
         self.satisfied = status == Status::Locked;
         if self.outcomes.iter().any(|outcome| outcome.status != Status::Locked) {
@@ -86,6 +82,11 @@ impl Tachometer<'_> {
             self.restart(self.last_us);
             self.until_search = until_search;
             return;
+        }
+        let torn = self.store.is_torn();
+        if torn {
+            self.store.mend(measured);
+            self.fade(measured);
         }
         let window_us = self.store.segment_us() * WINDOW_SEGMENTS as u32;
         let wanted = self.outcomes.iter().map(|o| o.wanted_us).fold(0.0, f32::max);
@@ -101,11 +102,19 @@ impl Tachometer<'_> {
         } else if status.reason().is_some() && adapts {
             // Nothing even in the longest window: begin again with a short one.
             self.restart(self.last_us);
-        } else {
-            for _ in 0..HOP_SEGMENTS {
+        } else if !torn {
+            let hop = self.rhythm.hop(self.store.segment_us());
+            for _ in 0..hop {
                 self.store.drop_oldest();
-                self.heat.fade(WINDOW_SEGMENTS as u16);
             }
+            self.fade(hop);
+        }
+        self.begin();
+    }
+
+    fn fade(&mut self, segments: usize) {
+        for _ in 0..segments {
+            self.heat.fade(WINDOW_SEGMENTS as u16);
         }
     }
 }

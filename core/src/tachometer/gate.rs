@@ -9,8 +9,11 @@ use crate::settings::Settings;
 /// Upper bits of column and row, which no pixel on a sensor has: where they end up set, a subtraction has borrowed.
 const BORROWED: u32 = 0x8000_8000;
 
-/// A power of two: steps below it add up without overflow, four at a time.
-const FAR_US: u32 = 1 << 28;
+/// Events that share their questions.
+const SHARED: usize = 8;
+
+/// A power of two: steps below it add up without overflow, [`SHARED`] at a time.
+const FAR_US: u32 = 1 << 27;
 
 /// What an event must be to pass.
 #[derive(Clone, Copy, Debug)]
@@ -67,10 +70,10 @@ impl Gate {
     pub fn admit(&mut self, events: &[PackedEvent]) -> usize {
         let Self { mut low_us, mut left_us, origin, span, .. } = *self;
         let mut passed = 0;
-        // Four share their questions: where none steps far, none steps back, and the last is the latest.
-        for four in events.as_chunks::<4>().0 {
+        // Several share their questions: where none steps far, none steps back, and the last is the latest.
+        for several in events.as_chunks::<SHARED>().0 {
             let (mut before_us, mut steps, mut inside) = (low_us, 0, BORROWED);
-            for event in four {
+            for event in several {
                 steps |= event.low_us().wrapping_sub(before_us);
                 before_us = event.low_us();
                 inside &= kept_borrowed(event.pixel(), origin, span);
@@ -80,7 +83,7 @@ impl Gate {
                 break;
             }
             (low_us, left_us) = (before_us, left_us - step_us);
-            passed += 4;
+            passed += SHARED;
         }
         for event in &events[passed..] {
             let step_us = event.low_us().wrapping_sub(low_us);

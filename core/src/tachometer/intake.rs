@@ -5,7 +5,7 @@ use heapless::Vec;
 use super::gate::{Gate, Outside};
 use super::{BASE_WINDOW_US, FIRST_WINDOW_US, Job, LONGEST_WINDOW_US, Tachometer, segment_us};
 use crate::event::{Event, GyroSample, PackedEvent};
-use crate::store::WINDOW_SEGMENTS;
+use crate::store::{MOST_WEIGHT_LOG2, WINDOW_SEGMENTS};
 
 /// Time going back by more than this restarts the window; less is disorder, and the event is left out.
 const CLOCK_RESET_US: u64 = 1_000_000;
@@ -43,21 +43,28 @@ impl Tachometer<'_> {
     ///
     /// Cost: `evtach bench cost`; besides, one pass over the heat map for each segment that ends.
     pub fn push_packed(&mut self, first_us: u64, events: &[PackedEvent]) {
+        self.push_thinned(first_us, events, 0);
+    }
+
+    /// Takes in events that were thinned evenly before, so that each stands for 2^`weight_log2`, up to 2^15; the rest as
+    /// [`push_packed`](Self::push_packed).
+    pub fn push_thinned(&mut self, first_us: u64, events: &[PackedEvent], weight_log2: u8) {
+        let weight_log2 = weight_log2.min(MOST_WEIGHT_LOG2);
         let (mut rest, mut before_us) = (events, first_us);
         loop {
-            let seen = self.take_in(rest, &mut before_us);
+            let seen = self.take_in(rest, weight_log2, &mut before_us);
             rest = &rest[seen..];
             let Some((event, later)) = rest.split_first() else { return };
             let event = event.unpack(before_us);
             before_us = event.t_us;
-            self.push_one(&event);
+            self.push_one(&event, weight_log2);
             rest = later;
         }
     }
 
     /// Takes in events as long as nothing but the counts changes with them, and returns how many; `before_us` becomes
     /// the time of the last of them.
-    fn take_in(&mut self, events: &[PackedEvent], before_us: &mut u64) -> usize {
+    fn take_in(&mut self, events: &[PackedEvent], weight_log2: u8, before_us: &mut u64) -> usize {
         let end_us = if self.overrun { u64::MAX } else { self.store.open_end_us() };
         let far = before_us.abs_diff(self.last_us) > CLOCK_RESET_US;
         if !self.started || far {
@@ -70,16 +77,15 @@ impl Tachometer<'_> {
             let rest = &events[taken..];
             let passed = &rest[..gate.admit(rest)];
             if self.overrun {
-                self.ignored.overrun += passed.len() as u64;
+                self.ignored.overrun += (passed.len() as u64) << weight_log2;
             } else {
-                self.heat.add(passed);
-                self.store.push(passed);
+                self.store_all(passed, weight_log2);
             }
             taken += passed.len();
             let Some(stopped) = events.get(taken) else { break };
             match gate.outside(*stopped) {
-                Some(Outside::Sensor) => self.ignored.out_of_bounds += 1,
-                Some(Outside::Roi) => self.ignored.out_of_roi += 1,
+                Some(Outside::Sensor) => self.ignored.out_of_bounds += 1 << weight_log2,
+                Some(Outside::Roi) => self.ignored.out_of_roi += 1 << weight_log2,
                 None => break,
             }
             taken += 1;
@@ -92,22 +98,23 @@ impl Tachometer<'_> {
         taken
     }
 
-    fn push_one(&mut self, event: &Event) {
+    fn push_one(&mut self, event: &Event, weight_log2: u8) {
+        let count = 1 << weight_log2;
         if !self.settings.geometry.contains(event.x, event.y) {
-            self.ignored.out_of_bounds += 1;
+            self.ignored.out_of_bounds += count;
             return;
         }
         if self.settings.roi.is_some_and(|roi| !roi.contains(event.x, event.y)) {
-            self.ignored.out_of_roi += 1;
+            self.ignored.out_of_roi += count;
             return;
         }
         if event.t_us > LATEST_US {
-            self.ignored.out_of_order += 1;
+            self.ignored.out_of_order += count;
             return;
         }
         if event.t_us < self.last_us && self.started {
             if self.last_us - event.t_us < CLOCK_RESET_US {
-                self.ignored.out_of_order += 1;
+                self.ignored.out_of_order += count;
                 return;
             }
             self.started = false;
@@ -120,12 +127,16 @@ impl Tachometer<'_> {
             self.advance(event.t_us);
         }
         if self.overrun {
-            self.ignored.overrun += 1;
+            self.ignored.overrun += count;
             return;
         }
-        let packed = [PackedEvent::pack(event)];
-        self.heat.add(&packed);
-        self.store.push(&packed);
+        self.store_all(&[PackedEvent::pack(event)], weight_log2);
+    }
+
+    /// Takes in events of the open segment. The heat map counts what the store keeps, each for as many as it stands for.
+    fn store_all(&mut self, events: &[PackedEvent], weight_log2: u8) {
+        self.store
+            .push(events, weight_log2, |event, stands_log2| self.heat.count(event, stands_log2));
     }
 
     /// Forgets the window; rotors keep their letters.
@@ -143,6 +154,8 @@ impl Tachometer<'_> {
     /// Closes segments until the open one holds `t_us`.
     fn advance(&mut self, t_us: u64) {
         let gap_us = t_us - self.store.open_end_us();
+        let spare_us = self.store.spare() as u64 * u64::from(self.store.segment_us());
+        let goes_on = self.window_segments > 0 && gap_us < spare_us;
         if gap_us > u64::from(LONGEST_WINDOW_US) && self.window_segments == 0 {
             // Nothing for longer than any window: what went before says nothing about what comes.
             self.restart(t_us);
@@ -150,17 +163,26 @@ impl Tachometer<'_> {
         }
         while t_us >= self.store.open_end_us() {
             if self.store.full() {
-                self.overrun = true;
-                return;
+                if !goes_on {
+                    self.overrun = true;
+                    return;
+                }
+                self.ignored.overrun += self.store.give_up(self.window_segments);
+                self.heat.fade(WINDOW_SEGMENTS as u16);
             }
             self.store.close_segment();
+            self.begin();
+        }
+    }
+
+    /// Begins to measure the window once it is full, or makes it longer first.
+    pub(super) fn begin(&mut self) {
+        while self.window_segments == 0 && self.store.closed() >= WINDOW_SEGMENTS {
             let window_us = self.store.segment_us() * WINDOW_SEGMENTS as u32;
-            if self.window_segments == 0 && self.store.closed() >= WINDOW_SEGMENTS {
-                if window_us + WINDOW_SEGMENTS as u32 <= self.target_us {
-                    self.store.lengthen(segment_us(self.target_us.min(2 * window_us)));
-                } else {
-                    self.start(WINDOW_SEGMENTS);
-                }
+            if window_us + WINDOW_SEGMENTS as u32 <= self.target_us {
+                self.store.lengthen(segment_us(self.target_us.min(2 * window_us)));
+            } else {
+                self.start(WINDOW_SEGMENTS);
             }
         }
     }

@@ -7,9 +7,6 @@ use crate::rotors::{Disc, Visits};
 use crate::settings::Poll;
 use crate::speed::measurement::{Measurement, Outcome, Stated};
 
-/// Following a rotor, every so many readings the whole image is searched again.
-const SEARCH_EVERY: u8 = 10;
-
 impl Tachometer<'_> {
     /// Starts measuring the window over the oldest segments.
     pub(super) fn start(&mut self, segments: usize) {
@@ -24,18 +21,30 @@ impl Tachometer<'_> {
             self.candidates.push(Suspect { found: known.found, followed }).ok();
         }
         if self.until_search == 0 || self.candidates.is_empty() {
-            self.candidates.clear();
             self.search();
+            return;
+        }
+        let beside = self.rhythm.searches_beside(self.until_search);
+        self.until_search -= 1;
+        if beside {
+            let known = self.candidates.iter().map(|known| known.found.disc);
+            let beside = Extraction::beside(known);
+            self.search_by(beside);
         } else {
-            self.until_search -= 1;
             self.measure_next(0);
         }
     }
 
+    /// Searches the whole image.
     fn search(&mut self) {
-        self.until_search = SEARCH_EVERY;
+        self.until_search = self.rhythm.search_every;
+        self.candidates.clear();
+        self.search_by(Extraction::default());
+    }
+
+    fn search_by(&mut self, extraction: Extraction) {
         self.scratch.ready_for_search();
-        self.job = Job::Search(Extraction::default());
+        self.job = Job::Search(extraction);
     }
 
     /// Advances the measurement by at most `steps` steps, each of less than a million instructions with the device's memory (`evtach bench cost`).
@@ -83,7 +92,6 @@ impl Tachometer<'_> {
                 let followed = self.candidates.get(index).is_some_and(|c| c.followed.is_some());
                 if followed && outcome.status != Status::Locked {
                     // Lost: look at the whole image again, in this very window.
-                    self.candidates.clear();
                     self.outcomes.clear();
                     self.search();
                     return false;

@@ -142,6 +142,7 @@ pub enum System {
     Fault,
     FaultClear,
     Sensor,
+    Events,
     Preset,
     Headers,
 }
@@ -263,6 +264,7 @@ pub const COMMANDS: &[(&str, Command)] = table![
     ("SYSTem:FAULt?", Command::System(System::Fault)),
     ("SYSTem:FAULt:CLEar", Command::System(System::FaultClear)),
     ("SYSTem:SENSor?", Command::System(System::Sensor)),
+    ("SYSTem:EVENts?", Command::System(System::Events)),
     ("SYSTem:PRESet", Command::System(System::Preset)),
     ("SYSTem:HELP:HEADers?", Command::System(System::Headers)),
     ("HCOPy:SDUMp:DATA?", Command::Hardcopy),

@@ -38,6 +38,21 @@ pub struct View {
     pub window_us: Option<u32>,
 }
 
+/// What became of the events that the sensor sent since the start: each is counted once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Fate {
+    /// Taken in by the measurement.
+    pub used: u64,
+    /// Left out evenly, because more waited to be measured.
+    pub thinned: u64,
+    /// Left out, because they came while a window took too long to measure.
+    pub late: u64,
+    /// Lost by the sensor or the link.
+    pub lost_before: u64,
+    /// Lost, because there was no room.
+    pub overrun: u64,
+}
+
 /// What the recorder does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RecorderState {
@@ -136,6 +151,9 @@ pub trait Device {
 
     /// Size of the sensor, where one is known.
     fn geometry(&self) -> Option<Geometry>;
+
+    /// What became of the events so far.
+    fn fate(&self) -> Fate;
 
     /// What the measurement looks at; not kept over power cycles.
     fn view(&self) -> View;

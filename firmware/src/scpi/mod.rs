@@ -31,7 +31,7 @@ use response::Response;
 use session::{Block, BlockKind, Flow, Session};
 
 pub use device::{
-    Device, Identity, RecorderFailed, RecorderState, RecorderStatus, Statistics, View,
+    Device, Fate, Identity, RecorderFailed, RecorderState, RecorderStatus, Statistics, View,
 };
 pub use error::ErrorCode;
 pub use log::LogLine;

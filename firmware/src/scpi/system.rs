@@ -5,7 +5,7 @@ use core::fmt::Write as _;
 use heapless::String;
 
 use super::commands::{Access, Common, Group, HEADERS_BYTES, System};
-use super::device::{Device, View};
+use super::device::{Device, Fate, View};
 use super::error::ScpiError;
 use super::parameter::Parameters;
 use super::response::Response;
@@ -105,6 +105,12 @@ impl Session {
                     out.text(&words);
                 }
             },
+            System::Events => {
+                let Fate { used, thinned, late, lost_before, overrun } = device.fate();
+                for count in [used, thinned, late, lost_before, overrun] {
+                    out.plain(count);
+                }
+            }
             System::Fault => match device.fault() {
                 Some((fault, words)) => {
                     out.text(match fault {

@@ -20,25 +20,44 @@ pub struct Standing {
     pub latest_us: u64,
     /// Events that came, and found room.
     pub received: u64,
-    /// Events that the sensor or the link lost, or that found no room.
-    pub lost: u64,
+    /// Of these, left out evenly, because more waited to be measured.
+    pub thinned: u64,
+    /// Events that the sensor or the link lost.
+    pub lost_before: u64,
+    /// Events that came, and found no room.
+    pub overrun: u64,
 }
 
 impl Standing {
     /// Nothing has come yet.
-    pub const NONE: Self =
-        Self { geometry: None, trouble: None, latest_us: 0, received: 0, lost: 0 };
+    pub const NONE: Self = Self {
+        geometry: None,
+        trouble: None,
+        latest_us: 0,
+        received: 0,
+        thinned: 0,
+        lost_before: 0,
+        overrun: 0,
+    };
+
+    /// Events lost, whatever the cause.
+    #[must_use]
+    pub const fn lost(&self) -> u64 {
+        self.lost_before.saturating_add(self.overrun)
+    }
 }
 
 impl From<&spi::Acquired> for Standing {
     fn from(acquired: &spi::Acquired) -> Self {
-        let spi::Acquired { sensor, latest_us, account, overrun, .. } = acquired;
+        let spi::Acquired { sensor, latest_us, account, thinned, overrun, .. } = acquired;
         Self {
             geometry: sensor.map(|hello| hello.geometry),
             trouble: None,
             latest_us: *latest_us,
             received: account.received.saturating_sub(*overrun),
-            lost: account.lost.total().saturating_add(*overrun),
+            thinned: *thinned,
+            lost_before: account.lost.total(),
+            overrun: *overrun,
         }
     }
 }
@@ -51,7 +70,9 @@ impl From<&usb::Acquired> for Standing {
             trouble: *trouble,
             latest_us: *latest_us,
             received: delivered.received.saturating_sub(delivered.overrun),
-            lost: delivered.overrun.saturating_add(*lost_by_camera),
+            thinned: delivered.thinned,
+            lost_before: *lost_by_camera,
+            overrun: delivered.overrun,
         }
     }
 }

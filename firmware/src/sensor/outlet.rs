@@ -8,13 +8,11 @@ use evtach_core::{Geometry, GyroSample, PackedEvent};
 
 use crate::intake::{BLOCKS, Block};
 
-/// With more blocks than these waiting to be measured, events are thinned further; with fewer than
-/// the second, less.
-const CROWDED: usize = BLOCKS * 3 / 4;
-const RELAXED: usize = BLOCKS / 2;
+/// Thinnest: one event in 4096. A block of these bridges half a second at 1 Mev/s.
+const THINNEST_LOG2: u8 = 12;
 
-/// Thinnest: one event in 16.
-const MOST_STRIDE_LOG2: u32 = 4;
+/// With no more blocks free than these, one is filled up before it is sent: whoever measures has others to go on with.
+const SCARCE: usize = BLOCKS * 3 / 4;
 
 /// Most events that one word of any sensor stands for: an EVT 3 vector.
 const MOST_EVENTS_A_WORD: usize = 12;
@@ -62,6 +60,11 @@ impl Delivered {
 }
 
 /// Where events go.
+///
+/// While whoever measures is busy, blocks fill up. Of `BLOCKS`, the first half takes every event, of the rest each half every
+/// second one of those that the half before took, so that each bridges as long as all before it; in the last one every other event
+/// gives its place up whenever it is full. So a stretch is thinned, evenly, but never torn. Each block tells how many events
+/// one of its own stands for.
 pub(crate) struct Outlet<'o, 'b, M: RawMutex> {
     blocks: &'o mut Sender<'b, M, Block>,
     /// Whether whoever sends can wait: a recording, not a sensor.
@@ -70,26 +73,25 @@ pub(crate) struct Outlet<'o, 'b, M: RawMutex> {
     pub delivered: Delivered,
     /// Lost since the last block, to be told with the next.
     pub lost: u64,
-    stride_log2: u32,
+    /// Whether the block at hand holds something already: while blocks are scarce, it is filled up.
+    open: bool,
     /// Events so far, to keep one in so many.
     phase: u32,
 }
 
 impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
     pub const fn new(blocks: &'o mut Sender<'b, M, Block>, can_wait: bool) -> Self {
-        Self { blocks, can_wait, delivered: Delivered::NONE, lost: 0, stride_log2: 0, phase: 0 }
+        let delivered = Delivered::NONE;
+        Self { blocks, can_wait, delivered, lost: 0, open: false, phase: 0 }
     }
 
     /// Hands the events of these words on, in one block or more, and returns how many there were.
     pub async fn deliver(&mut self, mut words: impl Words, geometry: Geometry) -> u32 {
         let mut events = 0_u32;
         while !words.is_done() {
-            let slot = if self.can_wait {
-                Some(self.blocks.send().await)
-            } else {
-                self.thin_by_crowd();
-                self.blocks.try_send()
-            };
+            let free = if self.can_wait { BLOCKS } else { BLOCKS - self.blocks.len() };
+            let slot =
+                if self.can_wait { Some(self.blocks.send().await) } else { self.blocks.try_send() };
             let Some(slot) = slot else {
                 let before = events;
                 let mut nowhere = [PackedEvent::ZERO; 2 * MOST_EVENTS_A_WORD];
@@ -100,25 +102,33 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
                 self.lost += u64::from(events - before);
                 break;
             };
-            slot.clear();
-            while !words.is_done() && !slot.gyro.is_full() {
+            let (is_last, weight_log2) = (free == 1, crowd_log2(free));
+            if !self.open {
+                slot.clear();
+                slot.geometry = geometry;
+                slot.weight_log2 = weight_log2;
+            } else if !is_last && slot.weight_log2 > weight_log2 || slot.geometry != geometry {
+                // There is room again.
+                self.send(false);
+                continue;
+            }
+            while !words.is_done() && (is_last || !slot.gyro.is_full()) {
                 if slot.space().len() < MOST_EVENTS_A_WORD {
-                    break;
+                    if !is_last || slot.weight_log2 == THINNEST_LOG2 {
+                        break;
+                    }
+                    self.delivered.thinned += halve(slot, self.phase) as u64;
                 }
                 let Filled { events: count, near_us, sample } = words.fill(slot.space());
                 slot.filled(count);
                 if let Some(sample) = sample {
+                    // What is too much for the last block is left out, as events are.
                     slot.gyro.push(sample).ok();
                 }
                 events += count as u32;
                 let before = slot.events().len() - count;
-                if self.stride_log2 > 0 {
-                    let mask = (1 << self.stride_log2) - 1;
-                    let phase = &mut self.phase;
-                    let went = slot.retain(before, || {
-                        *phase = phase.wrapping_add(1);
-                        *phase & mask == 0
-                    });
+                if slot.weight_log2 > 0 {
+                    let went = slot.thin(before, slot.weight_log2, &mut self.phase);
                     self.delivered.thinned += went as u64;
                 }
                 if before == 0
@@ -127,32 +137,54 @@ impl<'o, 'b, M: RawMutex> Outlet<'o, 'b, M> {
                     slot.t_us = first.unpack(near_us).t_us;
                 }
             }
-            if !slot.is_empty() {
-                slot.geometry = geometry;
-                slot.lost = mem::take(&mut self.lost);
-                slot.last = false;
-                self.blocks.send_done();
+            self.open = !slot.is_empty();
+            let may_thin = is_last && slot.weight_log2 < THINNEST_LOG2;
+            let has_room = may_thin || slot.space().len() >= MOST_EVENTS_A_WORD;
+            let waits = free <= SCARCE && words.is_done() && has_room;
+            if self.open && !waits {
+                self.send(false);
             }
         }
         self.delivered.received += u64::from(events);
         events
     }
 
-    fn thin_by_crowd(&mut self) {
-        let waiting = self.blocks.len();
-        if waiting > CROWDED {
-            self.stride_log2 = (self.stride_log2 + 1).min(MOST_STRIDE_LOG2);
-        } else if waiting < RELAXED {
-            self.stride_log2 = self.stride_log2.saturating_sub(1);
+    /// Sends the block at hand.
+    fn send(&mut self, last: bool) {
+        if let Some(slot) = self.blocks.try_send() {
+            slot.lost = mem::take(&mut self.lost);
+            slot.last = last;
+            self.open = false;
+            self.blocks.send_done();
         }
     }
 
     /// Marks the end of a recording.
     pub async fn close(&mut self) {
-        let slot = self.blocks.send().await;
-        slot.clear();
-        slot.lost = mem::take(&mut self.lost);
-        slot.last = true;
-        self.blocks.send_done();
+        if self.open {
+            self.send(false);
+        }
+        self.blocks.send().await.clear();
+        self.send(true);
     }
 }
+
+/// How many events one is to stand for in the next block, as a power of two, with so many blocks free.
+const fn crowd_log2(free: usize) -> u8 {
+    match BLOCKS.checked_div(free) {
+        Some(crowd) => crowd.ilog2() as u8,
+        None => THINNEST_LOG2,
+    }
+}
+
+/// Every other event of a block goes, so that those left, of which the last was the `phase`-th, stand for twice as many; returns how
+/// many went.
+fn halve(slot: &mut Block, phase: u32) -> usize {
+    let last = phase >> slot.weight_log2;
+    let mut index = last.wrapping_sub(slot.events().len() as u32);
+    slot.weight_log2 += 1;
+    slot.thin(0, 1, &mut index)
+}
+
+#[cfg(test)]
+mod tests;

@@ -4,7 +4,7 @@ use evtach_core::{Geometry, Reading, Reason, Status};
 
 use super::front::{Front, Panel, Recording};
 use crate::instrument::{Action, Fault, Mode, Preferences, Sensor, State};
-use crate::scpi::{Device, Identity, RecorderFailed, RecorderStatus, Statistics, View};
+use crate::scpi::{Device, Fate, Identity, RecorderFailed, RecorderStatus, Statistics, View};
 use crate::sensor::usb::Trouble;
 
 impl<R: Recording, P: Panel> Device for Front<R, P> {
@@ -92,6 +92,10 @@ impl<R: Recording, P: Panel> Device for Front<R, P> {
 
     fn geometry(&self) -> Option<Geometry> {
         self.shared.standing().geometry
+    }
+
+    fn fate(&self) -> Fate {
+        self.shared.fate()
     }
 
     fn view(&self) -> View {

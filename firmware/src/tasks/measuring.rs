@@ -39,6 +39,7 @@ impl<R: FnMut(&Block)> Companion for Measuring<R> {
     #[inline(never)]
     fn between(&mut self, tachometer: &mut Tachometer<'_>) {
         self.shared.alive(Task::Measure);
+        self.shared.tell_late(tachometer.ignored().overrun);
         if let Some(Wanted { blades, roi, window_us }) = self.shared.take_wanted() {
             let settings = Settings { blades, roi, window_us, ..*tachometer.settings() };
             tachometer.configure(settings);

@@ -18,6 +18,9 @@ use crate::ui::Screen;
 /// Time between two drawings.
 const FRAME: Duration = Duration::from_millis(250);
 
+/// Time between drawing two parts of the screen: measuring, which waits for either, takes in what has come meanwhile.
+const BREATH: Duration = Duration::from_millis(2);
+
 /// Longest time between two looks at what the link has to say.
 const LINK: Duration = Duration::from_millis(50);
 
@@ -42,7 +45,10 @@ pub async fn show<R: Recording, P: Panel>(
         {
             let front = &mut *front.borrow_mut();
             front.refresh();
-            front.draw(&mut screen);
+            front.look(&mut screen);
+        }
+        while front.borrow_mut().draw_next(&mut screen) {
+            Timer::after(BREATH).await;
         }
         if shared.all_alive() {
             last_alive = Instant::now();

@@ -9,6 +9,7 @@ use embassy_sync::channel::Channel;
 use evtach_core::{Reading, Roi};
 
 use crate::instrument::Picture;
+use crate::scpi::Fate;
 use crate::sensor::Standing;
 
 /// Readings on their way to the instrument: at 20 a second, a tenth of a second.
@@ -55,6 +56,8 @@ pub struct Wanted {
 /// Everything between the tasks but the blocks of events.
 pub struct Shared {
     standing: Mutex<CriticalSectionRawMutex, Cell<Standing>>,
+    /// Events that came while a window was measured for too long.
+    late: Mutex<CriticalSectionRawMutex, Cell<u64>>,
     pub(super) readings: Channel<CriticalSectionRawMutex, Reading, READINGS>,
     pub(super) dropped: AtomicU32,
     /// The last that was asked for. No `Signal`, here nor below: that is not all zeros at the start, and would have the flash hold a
@@ -80,6 +83,7 @@ impl Shared {
     pub const fn new() -> Self {
         Self {
             standing: Mutex::new(Cell::new(Standing::NONE)),
+            late: Mutex::new(Cell::new(0)),
             readings: Channel::new(),
             dropped: AtomicU32::new(0),
             wanted: Channel::new(),
@@ -116,6 +120,20 @@ impl Shared {
     #[must_use]
     pub fn standing(&self) -> Standing {
         self.standing.lock(Cell::get)
+    }
+
+    /// How many events were left out so far because a window took too long to measure: told by the measuring task.
+    pub(super) fn tell_late(&self, events: u64) {
+        self.late.lock(|cell| cell.set(events));
+    }
+
+    /// What became of all events so far.
+    #[must_use]
+    pub(super) fn fate(&self) -> Fate {
+        let Standing { received, thinned, lost_before, overrun, .. } = self.standing();
+        let late = self.late.lock(Cell::get);
+        let used = received.saturating_sub(thinned).saturating_sub(late);
+        Fate { used, thinned, late, lost_before, overrun }
     }
 
     /// A task says that it is alive.

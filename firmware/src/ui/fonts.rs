@@ -2,7 +2,7 @@
 //!
 //! The build script packs what is here, and a test compares.
 
-use std::ops::RangeInclusive;
+use core::ops::RangeInclusive;
 
 use embedded_graphics::pixelcolor::Gray2;
 use mplusfonts::{BitmapFont, mplus};

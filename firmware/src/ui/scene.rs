@@ -53,11 +53,24 @@ fn draw<D: DrawTarget<Color = Rgb565>>(
     let Size { width, height } = shown.size;
     let (wide, high) = (width as usize, height as usize);
     let (columns, rows) = (picture.columns(), picture.rows());
-    let pixels = (0..high).flat_map(|y| {
-        let row = y * rows / high;
-        (0..wide).map(move |x| LEVELS[usize::from(picture.level(x * columns / wide, row))])
-    });
-    target.fill_contiguous(&shown, pixels)?;
+    // Where a cell begins in pixels.
+    let edge = |cell: usize, cells: usize, pixels: usize| (cell * pixels).div_ceil(cells) as i32;
+    for row in 0..rows {
+        let (top, bottom) = (edge(row, rows, high), edge(row + 1, rows, high));
+        let mut column = 0;
+        // Neighbours of one level at once: a picture is mostly dark.
+        while column < columns {
+            let level = picture.level(column, row);
+            let left = edge(column, columns, wide);
+            while column < columns && picture.level(column, row) == level {
+                column += 1;
+            }
+            let size =
+                Size::new((edge(column, columns, wide) - left) as u32, (bottom - top) as u32);
+            let run = Rectangle::new(shown.top_left + Point::new(left, top), size);
+            target.fill_solid(&run, LEVELS[usize::from(level)])?;
+        }
+    }
     // Nothing of a rotor beyond the picture's edge.
     let mut inside = target.clipped(&shown);
     let sensor_px = columns as f32 * f32::from(picture.cell_px());

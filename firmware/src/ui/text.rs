@@ -166,3 +166,49 @@ pub fn draw<D: DrawTarget<Color = Rgb565>>(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use std::string::ToString as _;
+    use std::vec::Vec;
+
+    use mplusfonts::image::Colors as _;
+
+    use super::super::fonts::FONTS;
+    use super::*;
+
+    #[test]
+    fn every_letter_is_the_one_that_was_packed() {
+        for (source, packed) in FONTS.iter().zip([&SMALL, &MEDIUM, &HUGE]) {
+            assert!(!source.about.is_empty());
+            let mut letters = 0;
+            for letter in source.row.clone().chain(source.others.chars()) {
+                let key = letter.to_string();
+                let entry = source.font.charmap.get(&key);
+                let Some((_, glyph)) = packed.set(&key).next() else { panic!("{letter} is gone") };
+                let image = entry.glyph.images.get(0).mul_offset(1, -1);
+                let levels: Vec<u8> =
+                    image.colors().into_iter().map(|level| level.luma()).collect();
+                let runs = packed
+                    .runs(glyph)
+                    .flat_map(|(level, length)| iter::repeat_n(level, length as usize));
+                let unpacked: Vec<u8> = runs.take(levels.len()).collect();
+                assert_eq!(unpacked, levels, "{} {letter}", source.name);
+                let corner = Point::new(glyph.x.into(), glyph.y.into());
+                let size = Size::new(glyph.width.into(), glyph.height.into());
+                assert_eq!(Rectangle::new(corner, size), image.bounding_box(), "{letter}");
+                assert_eq!(glyph.advance_px, (entry.advance_width_to)(""), "{letter}");
+                letters += usize::from(entry.key == key);
+            }
+            assert!(letters >= 12, "{} has {letters}", source.name);
+        }
+    }
+
+    #[test]
+    fn what_a_font_lacks_takes_no_room() {
+        for letter in ["/", "a", "°", "–"] {
+            assert_eq!(width(&HUGE, letter), 0, "{letter}");
+        }
+        assert_eq!(width(&SMALL, "1°2"), width(&SMALL, "12"));
+    }
+}

@@ -199,16 +199,15 @@ impl Session {
 }
 
 /// Who used the processor while the instrument ran.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Used {
     /// Seconds of the board's time.
     pub seconds: u32,
-    /// Instructions by task; "sleep" are those that were not carried out.
-    pub instructions: Vec<(String, u64)>,
-    /// Readings told over the link.
-    pub readings: u32,
-    /// Of these, how many held a speed of each rotor, in the order of their letters.
-    pub of_rotors: Vec<u32>,
+    /// Instructions by task in each second; "sleep" are those that were not carried out.
+    pub instructions: Vec<(String, Vec<u64>)>,
+    /// Ends of the windows in which each rotor's speed was read, in seconds since the first event, in the order of the
+    /// rotors' letters.
+    pub read_s: Vec<Vec<f64>>,
     /// Deepest stack while the program started, in bytes.
     pub stack_starting: u64,
     /// Deepest stack since, in bytes.
@@ -237,18 +236,19 @@ pub fn run_instrument(image: &Image, stream: &[u8], seconds: u32) -> Result<Used
         stdout.read_to_string(&mut said).map_err(failed)?;
     }
     let mut used = Used { seconds, ..Used::default() };
-    let mut of_rotors = BTreeMap::<String, u32>::new();
+    let mut read_s = BTreeMap::<String, Vec<f64>>::new();
     for line in told.lines().filter(|line| line.starts_with('{')) {
-        used.readings += 1;
         // The last line may be cut.
         let reading = serde_json::from_str::<serde_json::Value>(line).unwrap_or_default();
+        let number = |key: &str| reading[key].as_f64().unwrap_or_default();
+        let end_s = number("t_s") + 0.5 * number("window_s");
         for rotor in reading["rotors"].as_array().into_iter().flatten() {
             if let Some(id) = rotor["id"].as_str().filter(|_| rotor["rpm"].is_number()) {
-                *of_rotors.entry(id.to_owned()).or_default() += 1;
+                read_s.entry(id.to_owned()).or_default().push(end_s);
             }
         }
     }
-    used.of_rotors = of_rotors.into_values().collect();
+    used.read_s = read_s.into_values().collect();
     for (index, line) in said.lines().enumerate() {
         let number = |key: &str| {
             let word = line.split(' ').find_map(|word| word.strip_prefix(key)?.strip_prefix('='));
@@ -259,7 +259,11 @@ pub fn run_instrument(image: &Image, stream: &[u8], seconds: u32) -> Result<Used
             line.strip_prefix("used ").and_then(|rest| rest.split_once("name="))
         {
             let ticks = number("ticks").ok_or_else(foreign)?;
-            used.instructions.push((name.to_owned(), ticks * INSTRUCTIONS_PER_SLOW_TICK));
+            let instructions = ticks * INSTRUCTIONS_PER_SLOW_TICK;
+            match used.instructions.iter_mut().find(|(known, _)| known == name) {
+                Some((_, seconds)) => seconds.push(instructions),
+                None => used.instructions.push((name.to_owned(), vec![instructions])),
+            }
         } else if line.starts_with("ran ") {
             used.stack_starting = number("stack_starting").ok_or_else(foreign)?;
             used.stack_running = number("stack_running").ok_or_else(foreign)?;

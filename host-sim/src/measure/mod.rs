@@ -7,7 +7,9 @@ mod table;
 
 use evtach_core::Ignored;
 use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
-use evtach_core::{Event, GyroSample, Memory, Poll, Reading, Settings, StoredEvent, Tachometer, Work};
+use evtach_core::{
+    Event, GyroSample, Memory, Poll, Reading, Settings, StoredEvent, Tachometer, Work,
+};
 
 pub use json::{Document, FileFacts, ReadingRow, RotorRow, letter};
 pub use summary::{Summary, summarise};

@@ -4,7 +4,8 @@
 //! |---|---|
 //! | `run S`, `run_until S` | lets so many seconds pass, or until this time since power came |
 //! | `plug davis346 FILE.ev8`, `plug dvxplorer FILE.ev8`, `plug stick` | plugs something into the host port |
-//! | `firmware N`, `roll RAD_S` | the version of the camera's firmware; what its gyro measures |
+//! | `firmware N`, `roll RAD_S`, `repeat S` | of the next camera: the version of its firmware; what its gyro measures; what it sees comes again after so many seconds |
+//! | `cover` | a cap on the lens of the camera: nothing happens any more |
 //! | `unplug`, `unplug quiet`, `unplug errors` | with all signs; without errors; without a word from the port |
 //! | `camera` | what the camera has seen, left out and dropped, as JSON |
 //! | `fault halt`, `fault dead`, `fault odd`, `fault clock` | the camera's endpoint halts, for good, sends an odd byte, resets its clock |
@@ -54,6 +55,7 @@ pub struct Script {
     camera: Option<Rc<RefCell<Camera>>>,
     firmware: Option<u8>,
     roll_rad_s: f32,
+    repeat_us: Option<u64>,
 }
 
 fn ps(seconds: &str) -> Result<u64> {
@@ -105,7 +107,7 @@ fn events(path: &str) -> Result<Vec<Event>> {
 impl Script {
     /// Someone at a device.
     pub fn new(machine: Machine) -> Self {
-        Self { machine, camera: None, firmware: None, roll_rad_s: 0.0 }
+        Self { machine, camera: None, firmware: None, roll_rad_s: 0.0, repeat_us: None }
     }
 
     /// Carries out a line and says what comes of it.
@@ -121,6 +123,11 @@ impl Script {
             "plug" => self.plug(rest)?,
             "firmware" => self.firmware = Some(number(rest)?),
             "roll" => self.roll_rad_s = number(rest)?,
+            "repeat" => self.repeat_us = Some(ps(rest)? / crate::time::US),
+            "cover" => {
+                let camera = self.camera.as_ref().ok_or_else(|| anyhow!("there is no camera"))?;
+                camera.borrow_mut().cover();
+            }
             "unplug" => self.unplug(rest)?,
             "camera" => return self.camera(),
             "fault" => self.fault(rest)?,
@@ -207,7 +214,15 @@ impl Script {
             }
             _ => bail!("{kind:?} cannot be plugged in"),
         };
-        let mut camera = Camera::new(model, events(file)?);
+        let events = events(file)?;
+        let last_us = events.last().map_or(0, |event| event.t_us);
+        let mut camera = Camera::new(model, events);
+        if let Some(period_us) = self.repeat_us.take() {
+            if period_us <= last_us {
+                bail!("{file} lasts longer than it is to take to come again");
+            }
+            camera.repeat(period_us);
+        }
         camera.roll_rad_s = self.roll_rad_s;
         if let Some(firmware) = self.firmware {
             camera.firmware = firmware;

@@ -133,6 +133,17 @@ impl Board {
         self.say(&format!("plug {name} {}", path.display()));
     }
 
+    /// Plugs a camera in that sees these events again and again, each time so many seconds later.
+    pub fn plug_camera_for_good(&mut self, camera: Camera, sees: &Loaded, period_s: f64) {
+        self.say(&format!("repeat {period_s}"));
+        self.plug_camera(camera, sees);
+    }
+
+    /// Puts the cap on the camera's lens.
+    pub fn cover(&mut self) {
+        self.say("cover");
+    }
+
     /// Plugs the camera in again that was pulled out.
     pub fn plug_again(&mut self) {
         self.say("plug again");

@@ -4,6 +4,7 @@ mod board;
 mod boot;
 mod camera;
 mod faults;
+mod minute;
 mod replay;
 mod walk;
 

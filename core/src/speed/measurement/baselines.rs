@@ -17,6 +17,8 @@ const ON_THE_WAY: Effort = Effort { pairs: 4, ..LOCK };
 /// A baseline that is longer by less than this factor is not worth a lock of its own.
 const MORE: f32 = 1.5;
 const FRACTIONAL: Effort = Effort { pairs: 3, ..LOCK };
+/// The same where these few deviate: scatter goes, an alias stays.
+const FRACTIONAL_AGAIN: Effort = Effort { pairs: 9, ..LOCK };
 /// The lock of a rotor that is followed: the phase tells its speed, and these bear it out.
 const FOLLOWING: Effort = Effort { pairs: 3, points: SLICE_POINTS / 2, ..LOCK };
 /// Where there are more events than this for each pair, more pairs are registered, up to [`MAX_PAIRS`].
@@ -42,6 +44,8 @@ impl Measurement {
         }
     }
 
+    // Not inlined: it is called in four places.
+    #[inline(never)]
     pub(super) fn plan(&mut self, window: &Window<'_>, periods: f32, effort: Effort) {
         let plan = Pairs::plan(self.pace(), periods, effort, self.events, window.duration_us);
         self.pairs = Some(plan);
@@ -130,6 +134,7 @@ impl Measurement {
             }
         }
         let effort = if self.follows { Effort { pairs: 1, ..FOLLOWING } } else { FRACTIONAL };
+        self.turn = 0;
         self.plan(window, (longest - FRACTION).max(0.65), effort);
         self.stage = Stage::Fractional;
     }
@@ -138,6 +143,11 @@ impl Measurement {
     pub(super) fn fractional(&mut self, window: &Window<'_>, icp: &mut Icp) {
         let Some(pairs) = self.advance(window, icp) else { return };
         self.evidence.fractional_deviation = pairs.deviation();
+        if self.turn == 0 && !self.follows && !self.fits_between() {
+            self.turn = 1;
+            self.plan(window, pairs.periods(), FRACTIONAL_AGAIN);
+            return;
+        }
         self.stage = Stage::Verdict;
     }
 }

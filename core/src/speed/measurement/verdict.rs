@@ -7,6 +7,7 @@ use crate::math::{TAU, sqrt};
 use crate::reading::{Reason, Status};
 use crate::speed::queue::stretch;
 use crate::store::Window;
+use crate::tachometer::BASE_WINDOW_US;
 
 /// A rotor keeps at least this share of its events in step, if they have no jitter.
 const LEAST_COHERENCE: f32 = 0.3;
@@ -19,9 +20,12 @@ const MOST_JITTER_S: f32 = 150e-6;
 /// Blur that a jitter of one pixel makes as the pose measures it, where the harmonic rises by doubling: up to half an octave
 /// past the best, where 1 / (m exp(-m^2 / 2)) is 1.9.
 const BLUR_OF_JITTER: f32 = 1.9;
-/// Farthest deviation of the fractional-baseline test, as a share of the angle of symmetry; or half of what a speed by one
-/// winding more would show, where that is more: this fraction of the difference of the two angles.
+/// Farthest deviation of the fractional-baseline test where the harmonic is in doubt, as a share of the angle of symmetry; or
+/// half of what a speed by one winding more would show, where that is more: this fraction of the difference of the two angles.
 const MOST_DEVIATION: f32 = 0.03;
+/// The same where no other harmonic keeps step: a third of what a pattern shows that does not turn at all. Jitter of a tenth of a
+/// fast rotor's period makes its registrations scatter by as much as the next winding would.
+const MOST_CLEAR_DEVIATION: f32 = 0.35 * FRACTION;
 /// Witnesses of the lock may differ by this much, or by eight standard errors.
 const LOCK_AGREEMENT: f32 = 2e-3;
 const LOCK_SIGMAS: f32 = 8.0;
@@ -34,9 +38,15 @@ const ALIKE_SIGMA: f32 = 0.2;
 const COARSE_PHASE: f32 = 0.05;
 const COARSE_PHASE_SIGMA: f32 = 0.03;
 const COARSE_SPREAD: f32 = 0.5;
-/// A coarse reading with a larger relative error is none, and what a hand shakes, in pixels.
-const MOST_COARSE_SIGMA: f32 = 0.012;
+/// No reading may be farther off than this, relative: so many standard errors of a coarse one, and all that a busy readout's
+/// queue may stretch the window by, must each fit into it.
+const MOST_ERROR: f32 = 0.01;
+const COARSE_SIGMAS: f32 = 3.0;
+/// The largest relative error where the stream ended before a window was full.
+const MOST_SHORT_SIGMA: f32 = 0.012;
+/// What a hand shakes, in pixels, and blocks of a turn from which on a single mark's axis is told from the mark.
 const SHAKE_PX: f32 = 3.0;
+const MARK_BLOCKS: usize = 4;
 /// What shadows, flicker and folded slices may bias a registration by, in radians: a fifth of a pixel half-way to the rim.
 const BIAS_RAD: f32 = 5e-3;
 /// Standard deviation of the error by a busy readout, as a share of how far its queue may stretch the window.
@@ -63,11 +73,7 @@ impl Measurement {
             let sigma =
                 sqrt(lock.sigma_rad_s * lock.sigma_rad_s + phase.sigma_rad_s * phase.sigma_rad_s);
             let agree = apart < (LOCK_AGREEMENT * lock.omega_rad_s.abs()).max(LOCK_SIGMAS * sigma);
-            // Where the parts were not counted, they are at least as many as the windings of the line.
-            let parts = if self.parts.is_none() { self.windings.max(1) } else { 1 };
-            let deviation = self.evidence.fractional_deviation.map(|d| d * parts as f32);
-            let half_way = 0.5 * FRACTION / (self.windings as f32 + 1.0);
-            let whole = deviation.is_some_and(|d| d < half_way.max(MOST_DEVIATION));
+            let whole = self.fits_between();
             let both = combine(lock, phase);
             let sharp = both.sigma_rad_s.max(held_up * both.omega_rad_s.abs())
                 < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
@@ -103,15 +109,24 @@ impl Measurement {
         } else {
             0.0
         };
-        let own = self.estimate.sigma_rad_s;
-        let late = held_up * self.estimate.omega_rad_s;
-        self.estimate.sigma_rad_s = sqrt(own * own + late * late);
-        if self.status == Status::Coarse {
-            self.widen_coarse();
+        match self.status {
+            Status::Coarse => self.widen_coarse(window, held_up / QUEUE_SIGMA, roll),
+            Status::Locked if self.pose.in_period() < MARK_BLOCKS => self.widen_mark(),
+            _ => {}
         }
         let own = self.estimate.sigma_rad_s;
-        self.estimate.sigma_rad_s = sqrt(own * own + clock * clock);
+        let late = held_up * self.estimate.omega_rad_s;
+        self.estimate.sigma_rad_s = sqrt(own * own + late * late + clock * clock);
         self.roll_sigma_rad_s = roll;
+    }
+
+    /// Whether the rotor is also where it should be between whole periods, where an alias is not.
+    pub(super) fn fits_between(&self) -> bool {
+        // Where the parts were not counted, they are at least as many as the windings of the line.
+        let parts = if self.parts.is_none() { self.windings.max(1) } else { 1 };
+        let half_way = 0.5 * FRACTION / (self.windings as f32 + 1.0);
+        let most = if self.doubted() { half_way.max(MOST_DEVIATION) } else { MOST_CLEAR_DEVIATION };
+        self.evidence.fractional_deviation.is_some_and(|d| d * (parts as f32) < most)
     }
 
     /// Share of the events that a rotor of this speed keeps in step at least: jitter of sigma scatters a phase of m w t by m w sigma.
@@ -128,12 +143,19 @@ impl Measurement {
         if self.in_doubt() {
             return false;
         }
-        self.pose.blur_px() < self.blur_px(MOST_BLUR)
+        self.edges_px() < self.blur_px(MOST_BLUR)
     }
 
-    /// Whether the edges are so sharp that a registration that went astray does not count against them.
+    /// Whether the edges are so sharp that a registration that went astray does not count against them. Noise, which leads it
+    /// astray, is no blur where no other harmonic keeps step.
     pub(super) fn sharp(&self) -> bool {
-        self.pose.sharpness_px() < self.blur_px(LEAST_BLUR)
+        let blur_px = if self.doubted() { self.pose.sharpness_px() } else { self.edges_px() };
+        blur_px < self.blur_px(LEAST_BLUR)
+    }
+
+    /// How sharp the edges are. A single mark is told from its axis's shaking by its sharpness alone, so noise counts against it.
+    fn edges_px(&self) -> f32 {
+        if self.parts == Some(1) { self.pose.sharpness_px() } else { self.pose.blur_px() }
     }
 
     fn blur_px(&self, (share, px): (f32, f32)) -> f32 {
@@ -149,16 +171,28 @@ impl Measurement {
         Estimate { sigma_rad_s: sqrt(own * own + bias * bias), ..lock }
     }
 
-    /// A coarse reading of a single mark is as good as its axis holds still: what the mark does and what the camera
-    /// does look alike. One that is worse than coarse is none.
-    fn widen_coarse(&mut self) {
-        let turn_rad = self.evidence.periods.unwrap_or(0.0) * TAU;
+    /// The reading of a single mark is as good as its axis holds still, where it is not followed around the turn: what the mark does
+    /// and what the camera does look alike.
+    fn widen_mark(&mut self) {
         if self.parts == Some(1) {
+            let turn_rad = self.evidence.periods.unwrap_or(0.0) * TAU;
             let shake = SHAKE_PX / (self.disc.radius_px * turn_rad) * self.omega_rad_s;
             let own = self.estimate.sigma_rad_s;
             self.estimate.sigma_rad_s = sqrt(own * own + shake * shake);
         }
-        if self.estimate.sigma_rad_s > MOST_COARSE_SIGMA * self.omega_rad_s.abs() {
+    }
+
+    /// A coarse reading that may be farther off than any reading may be is none, as the next window will show more; but where the
+    /// stream ended before one was full, it is all there is. `stretch` is the share by which the window may be stretched, the roll
+    /// what the camera may turn by.
+    fn widen_coarse(&mut self, window: &Window<'_>, stretch: f32, roll_rad_s: f32) {
+        self.widen_mark();
+        let short = window.duration_us < BASE_WINDOW_US;
+        let most = if short { MOST_SHORT_SIGMA } else { MOST_ERROR / COARSE_SIGMAS };
+        let stretched = stretch > MOST_ERROR;
+        let own = self.estimate.sigma_rad_s;
+        let sigma_rad_s = sqrt(own * own + roll_rad_s * roll_rad_s);
+        if stretched || sigma_rad_s > most * self.omega_rad_s.abs() {
             self.status = Status::Refused(Reason::Ambiguous);
         }
     }

@@ -51,6 +51,11 @@ impl Block {
         self.time_us / self.count.max(1.0)
     }
 
+    /// Number of events.
+    pub const fn count(&self) -> f32 {
+        self.count
+    }
+
     /// Share of the events in step.
     pub fn share(&self) -> f32 {
         self.in_step / self.count.max(1.0)
@@ -69,6 +74,8 @@ impl Block {
     };
 
     /// Adds an event: how its direction changes with a shift, its phase off the template, and when it came.
+    // A function of its own: where it is called registers are scarce, and a fifth of the instructions would shuffle them.
+    #[inline(never)]
     pub fn add(
         &mut self,
         (x, y): (f32, f32),

@@ -71,16 +71,21 @@ pub fn prepare(psram: Psram, injection: Injection) -> Parts {
     Parts { front, store, preferences, injection }
 }
 
-/// Prints who used the processor in so many seconds, and ends the program.
+/// Prints who used the processor in each of so many seconds, and ends the program.
 #[embassy_executor::task]
 pub async fn report_task(seconds: u32) {
-    let before = usage::ticks();
-    Timer::after_secs(seconds.into()).await;
-    let after = usage::ticks();
-    let mut console = Console::default();
-    for ((_, name), (after, before)) in USERS.iter().zip(after.iter().zip(before)) {
-        writeln!(console, "used ticks={} name={name}", after - before).ok();
+    let mut before = usage::ticks();
+    for _ in 0..seconds {
+        Timer::after_secs(1).await;
+        let after = usage::ticks();
+        let mut console = Console::default();
+        for ((_, name), (after, before)) in USERS.iter().zip(after.iter().zip(before)) {
+            writeln!(console, "used ticks={} name={name}", after - before).ok();
+        }
+        console.flush();
+        before = after;
     }
+    let mut console = Console::default();
     let (starting, running) = stack::depths();
     let acquired = ACQUIRED.lock(Cell::get);
     writeln!(

@@ -105,10 +105,34 @@ impl DrawTarget for Frames {
     where
         I: IntoIterator<Item = Pixel<Rgb565>>,
     {
+        self.rows(0..0);
+        let (mut first, mut end) = (HEIGHT, 0);
         for Pixel(Point { x, y }, colour) in pixels {
             let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { continue };
-            if x < WIDTH && y < HEIGHT {
-                self.rows(y..y + 1)[0][x] = colour.into_storage().to_le_bytes();
+            if let Some(pixel) = self.back.get_mut(y).and_then(|row| row.get_mut(x)) {
+                *pixel = colour.into_storage().to_le_bytes();
+                (first, end) = (first.min(y), end.max(y + 1));
+            }
+        }
+        if first < end {
+            self.rows(first..end);
+        }
+        Ok(())
+    }
+
+    fn fill_contiguous<I>(&mut self, area: &Rectangle, colours: I) -> Result<(), Infallible>
+    where
+        I: IntoIterator<Item = Rgb565>,
+    {
+        if area.intersection(&self.bounding_box()) != *area {
+            return self.draw_iter(area.points().zip(colours).map(|(at, c)| Pixel(at, c)));
+        }
+        let (left, top) = (area.top_left.x as usize, area.top_left.y as usize);
+        let mut colours = colours.into_iter();
+        for row in self.rows(top..top + area.size.height as usize) {
+            for pixel in &mut row[left..left + area.size.width as usize] {
+                let Some(colour) = colours.next() else { return Ok(()) };
+                *pixel = colour.into_storage().to_le_bytes();
             }
         }
         Ok(())
@@ -141,6 +165,16 @@ impl DrawTarget for Panel {
         match self {
             Self::Frames(frames) => frames.draw_iter(pixels),
             Self::Spare(spare) => spare.draw_iter(pixels),
+        }
+    }
+
+    fn fill_contiguous<I>(&mut self, area: &Rectangle, colours: I) -> Result<(), Infallible>
+    where
+        I: IntoIterator<Item = Rgb565>,
+    {
+        match self {
+            Self::Frames(frames) => frames.fill_contiguous(area, colours),
+            Self::Spare(spare) => spare.fill_contiguous(area, colours),
         }
     }
 

@@ -65,7 +65,11 @@ impl<'f> Words<'f> {
                 self.rest = self.rest.get(words * 4..).unwrap_or_default();
                 events
             }
-            Decoder::Evt3(decoder) => pack_evt3(decoder, &mut self.rest, self.base_us, places),
+            Decoder::Evt3(decoder) => {
+                let (words, events) = decoder.pack(self.rest.as_chunks().0, self.base_us, places);
+                self.rest = self.rest.get(words * 2..).unwrap_or_default();
+                events
+            }
             Decoder::None => {
                 self.rest = &[];
                 0
@@ -111,26 +115,6 @@ impl outlet::Words for Words<'_> {
     fn fill(&mut self, space: &mut [PackedEvent]) -> Filled {
         Filled { events: self.pack(space), near_us: self.first_us, sample: None }
     }
-}
-
-/// Packs the events of words as far as the places are sure to do: one word may be several events.
-fn pack_evt3(
-    decoder: &mut Evt3,
-    rest: &mut &[u8],
-    base_us: u64,
-    places: &mut [PackedEvent],
-) -> usize {
-    let words = take(rest, places.len() / VECTOR_EVENTS);
-    let (count, mut places) = (places.len(), places.iter_mut());
-    for word in words {
-        decoder.decode(u16::from_le_bytes(*word), |event| {
-            if let Some(place) = places.next() {
-                *place =
-                    PackedEvent::pack(&Event { t_us: base_us.wrapping_add(event.t_us), ..event });
-            }
-        });
-    }
-    count - places.len()
 }
 
 /// Takes up to `words` words of `N` bytes off the front. A rest shorter than a word does not exist: the

@@ -1,5 +1,5 @@
 //! `evtach bench image`: the image for the STM32F746G-DISCO, what it takes, and as a file that the board's own debug probe
-//! flashes when it is dragged onto its drive.
+//! flashes when it is dragged onto its drive. Exit code 1 past what is asked of flash or RAM.
 
 use std::fs;
 use std::path::PathBuf;
@@ -28,11 +28,13 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let image = device::build_for_board()?;
     println!("{}", image.path.display());
     let ram_bytes = image.ram_bytes + image.stack_bytes;
+    let mut fits = true;
     for (what, is, asked) in [
         ("flash, bytes", image.flash_bytes, ASKED_FLASH_BYTES),
         ("internal RAM, bytes", ram_bytes, ASKED_RAM_BYTES),
     ] {
-        let verdict = if is <= asked { "" } else { "  too much" };
+        let verdict = if is <= asked { "" } else { "  TOO MUCH" };
+        fits &= is <= asked;
         println!("  {what:<24}{is:>10} of {asked}{verdict}");
     }
     println!("    variables             {:>10}", image.ram_bytes);
@@ -42,5 +44,5 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         fs::write(out, &image.flash).with_context(|| format!("cannot write {}", out.display()))?;
         println!("{}: copy it to the drive of the board", out.display());
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(ExitCode::from(u8::from(!fits)))
 }

@@ -1,13 +1,21 @@
 //! The host core with its 16 channels, with and without DMA.
 
+mod port;
+mod wire;
+
 use std::collections::VecDeque;
 
 use super::channel::{CHDIS, CHENA, Channel, hcint};
-use super::function::{Answer, Attached, Function};
+use super::function::Attached;
 use super::globals::{DMAEN, Globals, at, int};
 use crate::chip::{Device, Memory};
 use crate::cpu::nvic::Nvic;
-use crate::time::{MS, NEVER, S, US};
+use crate::time::{NEVER, US};
+
+pub use port::Unplug;
+use port::{PCDET, PCSTS, PENA, PENCHNG, POCCHNG};
+use wire::Flight;
+pub use wire::Traffic;
 
 const LINE: u8 = 77;
 const CHANNELS: usize = 16;
@@ -22,68 +30,17 @@ const HAINTMSK: u32 = 0x418;
 const HPRT: u32 = 0x440;
 const CHANNEL: u32 = 0x500;
 
-const PCSTS: u32 = 1;
-const PCDET: u32 = 1 << 1;
-const PENA: u32 = 1 << 2;
-const PENCHNG: u32 = 1 << 3;
-const POCCHNG: u32 = 1 << 5;
-const PRST: u32 = 1 << 8;
-const PPWR: u32 = 1 << 12;
-
 /// Packet status in the receive FIFO.
 const IN_DATA: u32 = 2;
 const IN_DONE: u32 = 3;
 
 /// A start of frame every 125 us.
 const MICROFRAME_PS: u64 = 125 * US;
-/// Token, turnaround, headers and handshake of a bulk transaction, as so many bytes more.
-const OVERHEAD_BYTES: u64 = 55;
-/// Bits a second on the wire.
-const WIRE_HZ: u64 = 480_000_000;
-/// A token that is answered NAK.
-const NAK_PS: u64 = 667_000;
-/// Time in which a device that is gone would have answered three times.
-const ERROR_PS: u64 = 5 * US;
-/// Time from a plug to its being seen.
-const CONNECT_PS: u64 = 100 * MS;
-
-/// What an unplugged camera leaves behind.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Unplug {
-    /// Errors on open channels, and the port says so.
-    Plain,
-    /// The port says so; transfers that were under way just never end.
-    Quiet,
-    /// Errors on open channels, and not a word from the port.
-    ErrorsOnly,
-}
 
 /// A word of the receive FIFO with what belongs to it.
 struct Received {
     status: u32,
     words: VecDeque<u32>,
-}
-
-/// A transaction on the wire.
-struct Flight {
-    channel: usize,
-    answer: Answer,
-    ends: u64,
-}
-
-/// What crossed the port.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Traffic {
-    /// Packets with data that came.
-    pub packets: u64,
-    /// Bytes that came.
-    pub bytes: u64,
-    /// Tokens that were answered NAK and told to the driver.
-    pub naks: u64,
-    /// Packets thrown away because their toggle was not the one waited for.
-    pub toggle_errors: u64,
-    /// Tokens that nobody answered.
-    pub errors: u64,
 }
 
 /// OTG_HS as a host.
@@ -136,39 +93,6 @@ impl Default for Host {
 }
 
 impl Host {
-    /// Plugs a device in.
-    pub fn plug(&mut self, function: Box<dyn Function>, now: u64) {
-        self.attached = Some(Attached::new(function));
-        self.seen_at = if self.port & PPWR != 0 { now + CONNECT_PS } else { NEVER };
-    }
-
-    /// Takes the device out and hands it back.
-    pub fn unplug(&mut self, how: Unplug) -> Option<Box<dyn Function>> {
-        let gone = self.attached.take()?;
-        self.seen_at = NEVER;
-        if how != Unplug::ErrorsOnly {
-            self.disconnected();
-        }
-        if how == Unplug::Quiet {
-            self.flight = None;
-            for channel in &mut self.channels {
-                channel.active = false;
-            }
-        }
-        Some(gone.function)
-    }
-
-    fn disconnected(&mut self) {
-        if self.port & PCSTS != 0 {
-            self.globals.latched |= int::DISC;
-            if self.port & PENA != 0 {
-                self.port |= PENCHNG;
-                self.next_sof = NEVER;
-            }
-            self.port &= !(PCSTS | PENA | PRST);
-        }
-    }
-
     fn dma(&self) -> bool {
         self.globals.gahbcfg & DMAEN != 0
     }
@@ -196,163 +120,6 @@ impl Host {
         })
     }
 
-    /// Words that wait in the receive FIFO, with the status word of each packet.
-    fn waiting_words(&self) -> usize {
-        self.received.iter().map(|packet| packet.words.len() + 1).sum()
-    }
-
-    /// Whether a channel may go on the wire now.
-    fn may_go(&self, channel: &Channel, now: u64) -> bool {
-        if !channel.active || channel.parked > now {
-            return false;
-        }
-        if channel.is_in() {
-            let room = self.globals.grxfsiz as usize;
-            self.dma() || self.waiting_words() + channel.max_packet() / 4 + 2 <= room
-        } else {
-            self.dma() || channel.out.len() >= channel.length().min(channel.max_packet())
-        }
-    }
-
-    /// Puts the next transaction on the wire, when it is free.
-    fn start_one(&mut self, now: u64, memory: &dyn Memory) {
-        if self.flight.is_some() || self.port & PENA == 0 {
-            return;
-        }
-        let order = (0..CHANNELS).map(|step| (self.turn + step) % CHANNELS);
-        let Some(index) = order.into_iter().find(|index| self.may_go(&self.channels[*index], now))
-        else {
-            return;
-        };
-        self.turn = (index + 1) % CHANNELS;
-        let dma = self.dma();
-        let channel = &mut self.channels[index];
-        let (address, endpoint) = (channel.address(), channel.endpoint());
-        let mut sent = 0;
-        let answer = match (&mut self.attached, self.broken > 0) {
-            (None, _) => Answer::Silence,
-            (Some(_), true) => {
-                self.broken -= 1;
-                Answer::Silence
-            }
-            (Some(device), false) if channel.is_in() => device.input(address, endpoint, now),
-            (Some(device), false) => {
-                let length = channel.length().min(channel.max_packet());
-                let mut data = vec![0; length];
-                if dma {
-                    memory.read(channel.dma, &mut data);
-                } else {
-                    data.copy_from_slice(&channel.out[..length]);
-                }
-                sent = length as u64;
-                match <[u8; 8]>::try_from(data.as_slice()) {
-                    Ok(setup) if channel.pid() == 3 => device.setup(address, setup, now),
-                    _ => device.output(address, endpoint, &data, now),
-                }
-            }
-        };
-        let takes = match &answer {
-            Answer::Data(bytes, _) => wire_ps(bytes.len() as u64),
-            Answer::Ack => wire_ps(sent),
-            Answer::Nak | Answer::Stall => NAK_PS,
-            Answer::Silence => ERROR_PS,
-        };
-        self.flight = Some(Flight { channel: index, answer, ends: now + takes });
-    }
-
-    fn land(&mut self, flight: Flight, memory: &mut dyn Memory) {
-        let dma = self.dma();
-        let index = flight.channel;
-        let now = flight.ends;
-        let channel = &mut self.channels[index];
-        match flight.answer {
-            Answer::Data(bytes, toggle) => {
-                let wanted = channel.pid() == 2;
-                if toggle != wanted {
-                    // Taken for one that was sent again: acknowledged and thrown away.
-                    self.traffic.toggle_errors += 1;
-                    channel.interrupts |= hcint::DTERR;
-                    channel.active &= dma;
-                    return;
-                }
-                self.traffic.packets += 1;
-                self.traffic.bytes += bytes.len() as u64;
-                let fits = bytes.len().min(channel.length());
-                channel.set_length(channel.length() - fits);
-                channel.set_packets(channel.packets().saturating_sub(1));
-                let short = bytes.len() < channel.max_packet();
-                let pid = channel.pid();
-                channel.toggle();
-                let done = short || channel.packets() == 0;
-                if dma {
-                    memory.write(channel.dma, &bytes[..fits]);
-                    channel.dma += fits as u32;
-                    channel.interrupts |= hcint::ACK;
-                    if done {
-                        channel.finish(hcint::XFRC | hcint::CHH);
-                    }
-                } else {
-                    let status = |kind, count| index as u32 | count << 4 | pid << 15 | kind << 17;
-                    let mut words: VecDeque<u32> = VecDeque::new();
-                    for chunk in bytes.chunks(4) {
-                        let mut word = [0; 4];
-                        word[..chunk.len()].copy_from_slice(chunk);
-                        words.push_back(u32::from_le_bytes(word));
-                    }
-                    let count = bytes.len() as u32;
-                    self.received.push_back(Received { status: status(IN_DATA, count), words });
-                    if done {
-                        let words = VecDeque::new();
-                        self.received.push_back(Received { status: status(IN_DONE, 0), words });
-                    }
-                    // Each packet wants a request of its own.
-                    self.channels[index].active = false;
-                }
-            }
-            Answer::Ack => {
-                let length = channel.length().min(channel.max_packet());
-                channel.set_length(channel.length() - length);
-                channel.set_packets(channel.packets().saturating_sub(1));
-                channel.toggle();
-                if dma {
-                    channel.dma += length as u32;
-                } else {
-                    let words = length.div_ceil(4) * 4;
-                    channel.out.drain(..words.min(channel.out.len()));
-                }
-                channel.interrupts |= hcint::ACK;
-                if channel.packets() == 0 || channel.length() == 0 {
-                    channel.finish(hcint::XFRC | hcint::CHH);
-                }
-            }
-            Answer::Nak => {
-                channel.interrupts |= hcint::NAK;
-                if dma {
-                    // The core asks again by itself; nobody hears of it, so time may be skipped.
-                    let endpoint = channel.endpoint();
-                    let ready = self
-                        .attached
-                        .as_ref()
-                        .map_or(now, |device| device.function.ready_at(endpoint, now));
-                    let again = if endpoint == 0 { now + NAK_PS } else { ready.max(now + NAK_PS) };
-                    channel.parked = again;
-                    if channel.mask & hcint::NAK != 0 {
-                        self.traffic.naks += 1;
-                        channel.parked = now + NAK_PS;
-                    }
-                } else {
-                    self.traffic.naks += 1;
-                    channel.active = false;
-                }
-            }
-            Answer::Stall => channel.finish(hcint::STALL | if dma { hcint::CHH } else { 0 }),
-            Answer::Silence => {
-                self.traffic.errors += 1;
-                channel.finish(hcint::TXERR | if dma { hcint::CHH } else { 0 });
-            }
-        }
-    }
-
     /// A channel is enabled or halted.
     fn set_character(&mut self, index: usize, value: u32, now: u64) {
         let channel = &mut self.channels[index];
@@ -374,32 +141,6 @@ impl Host {
         }
     }
 
-    fn write_port(&mut self, value: u32, now: u64) {
-        let before = self.port;
-        self.port &= !(value & (PCDET | PENCHNG | POCCHNG));
-        if value & PENA != 0 {
-            self.port &= !PENA;
-            self.next_sof = NEVER;
-        }
-        const KEPT: u32 = PRST | PPWR | 0xf << 13 | 1 << 6 | 1 << 7;
-        self.port = self.port & !KEPT | value & KEPT;
-        if before & PPWR == 0 && value & PPWR != 0 && self.attached.is_some() {
-            self.seen_at = now + CONNECT_PS;
-        }
-        if value & PPWR == 0 {
-            self.port &= !(PCSTS | PENA);
-            self.next_sof = NEVER;
-        }
-        if before & PRST != 0 && value & PRST == 0 && self.port & PCSTS != 0 {
-            if let Some(device) = &mut self.attached {
-                device.reset();
-            }
-            self.port |= PENA | PENCHNG;
-            self.began = now;
-            self.next_sof = now + MICROFRAME_PS;
-        }
-    }
-
     fn pop(&mut self) -> u32 {
         let Some(packet) = self.received.pop_front() else { return 0 };
         self.reading = packet.words;
@@ -410,11 +151,6 @@ impl Host {
         }
         packet.status
     }
-}
-
-/// Time of a transaction with so many bytes.
-fn wire_ps(bytes: u64) -> u64 {
-    (bytes + OVERHEAD_BYTES) * 8 * (S / WIRE_HZ)
 }
 
 impl Device for Host {

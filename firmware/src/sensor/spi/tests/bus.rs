@@ -10,7 +10,7 @@ use embedded_hal_async::digital::Wait;
 use embedded_hal_async::spi::{ErrorType, Operation, SpiBus, SpiDevice};
 
 use super::*;
-use crate::intake::{BLOCKS, Block, Pace};
+use crate::intake::{BLOCK_EVENTS, BLOCKS, Block, Pace};
 use crate::record::Decoder;
 use crate::test_time::block_on;
 
@@ -202,7 +202,7 @@ fn a_stream_that_is_cut_off_ends_too() {
 }
 
 #[test]
-fn nobody_measures_and_acquiring_goes_on_thinned_and_counted() {
+fn nobody_measures_and_acquiring_goes_on_thinned_and_none_is_lost() {
     // Ten times what the blocks hold, within a time that measuring never comes to.
     let count = 40_960;
     let events: Vec<Event> = (0..count)
@@ -227,11 +227,13 @@ fn nobody_measures_and_acquiring_goes_on_thinned_and_counted() {
         }
         (acquired, received, lost)
     });
-    assert!(acquired.thinned > 0 && acquired.overrun > 0, "{acquired:?}");
-    assert_eq!(lost, 0, "what was dropped last is told with a block that never came");
+    assert!(acquired.thinned > 0, "{acquired:?}");
+    assert_eq!((acquired.overrun, lost), (0, 0));
     assert_eq!(acquired.account.sent(), count);
-    assert_eq!(acquired.delivered(), received);
-    assert_eq!(received + acquired.thinned + acquired.overrun, count);
+    assert_eq!(acquired.delivered() + acquired.thinned, count);
+    // The last block waits to be full.
+    let waiting = acquired.delivered() - received;
+    assert!(waiting < BLOCK_EVENTS as u64, "{waiting}");
 }
 
 #[test]

@@ -82,6 +82,8 @@ pub struct Camera {
     registers: BTreeMap<Register, u32>,
     events: Vec<Event>,
     at: usize,
+    /// Time after which the events come again, later by as much; `None`: they come once.
+    repeat_us: Option<u64>,
     /// Time of the events when the camera's clock is zero.
     origin_us: u64,
     /// What goes wrong, and before which event.
@@ -135,6 +137,7 @@ impl Camera {
             registers: BTreeMap::from(registers),
             events,
             at: 0,
+            repeat_us: None,
             origin_us: 0,
             planned: VecDeque::new(),
             started_us: None,
@@ -148,6 +151,28 @@ impl Camera {
             dead: false,
             odd: false,
         }
+    }
+
+    /// Has the events come again and again, each time later by `period_us`, which is more than the time of the last of them.
+    pub fn repeat(&mut self, period_us: u64) {
+        self.repeat_us = Some(period_us);
+    }
+
+    /// A cap on the lens: what was still to happen does not.
+    pub fn cover(&mut self) {
+        (self.repeat_us, self.at) = (None, self.events.len());
+    }
+
+    /// An event with its time, by its number since the start; `None` once all have happened.
+    fn event(&self, number: usize) -> Option<Event> {
+        let mut event = match self.repeat_us {
+            Some(_) => *self.events.get(number.checked_rem(self.events.len())?)?,
+            None => *self.events.get(number)?,
+        };
+        if let Some(period_us) = self.repeat_us {
+            event.t_us += (number / self.events.len()) as u64 * period_us;
+        }
+        Some(event)
     }
 
     /// Sets what a register says, as another camera of its kind would have it.
@@ -199,7 +224,7 @@ impl Camera {
         self.log.clear();
         self.halted = false;
         self.since_skip = 0;
-        self.origin_us = self.events.get(self.at).map_or(0, |event| event.t_us);
+        self.origin_us = self.event(self.at).map_or(0, |event| event.t_us);
     }
 
     fn stop(&mut self) {
@@ -294,9 +319,8 @@ impl Camera {
         while let Some(started_us) = self.started_us {
             let clock_us = self.now_us.saturating_sub(started_us);
             let event = self
-                .events
-                .get(self.at)
-                .map(|event| Event { t_us: event.t_us.saturating_sub(self.origin_us), ..*event });
+                .event(self.at)
+                .map(|event| Event { t_us: event.t_us.saturating_sub(self.origin_us), ..event });
             let event_us = event.map_or(u64::MAX, |event| event.t_us);
             if gyro && self.next_gyro_us <= event_us.min(clock_us) {
                 let sample = GyroSample { t_us: self.next_gyro_us, roll_rad_s: self.roll_rad_s };
@@ -413,7 +437,7 @@ impl Camera {
     /// Whether every event has happened and been fetched.
     #[must_use]
     pub fn is_done(&self) -> bool {
-        self.at == self.events.len() && self.fifo.is_empty()
+        self.event(self.at).is_none() && self.fifo.is_empty()
     }
 
     /// Bytes in the FIFO.

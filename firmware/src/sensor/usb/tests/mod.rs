@@ -17,7 +17,7 @@ use evtach_core::{Event, Geometry, GyroSample, Polarity};
 
 use super::emulated::{Act, Camera, Device, Fault, Port, World};
 use super::*;
-use crate::intake::{BLOCKS, Block};
+use crate::intake::{BLOCK_EVENTS, BLOCKS, Block};
 use crate::record::Decoder;
 use crate::test_time::block_on;
 

@@ -92,7 +92,7 @@ fn a_dvxplorer_narrows_its_view_by_its_own_registers() {
 }
 
 #[test]
-fn nobody_measures_and_acquiring_goes_on_thinned_and_counted() {
+fn nobody_measures_and_acquiring_goes_on_thinned_and_none_is_lost() {
     let seen = events(Model::Davis346, 60_000, 200_000);
     let port = World::begin(vec![(0, plug(Camera::new(Model::Davis346, seen)))]);
     let state = Box::leak(Box::new(BusState::new()));
@@ -113,9 +113,11 @@ fn nobody_measures_and_acquiring_goes_on_thinned_and_counted() {
     }
     let mut heard = Heard { acquired, ..Heard::NOTHING };
     drain(&mut receiver, &mut heard);
-    assert!(acquired.delivered.thinned > 0 && acquired.delivered.overrun > 0, "{acquired}");
-    assert_eq!(acquired.delivered.received, 60_000);
-    closes(&heard, &port.0.borrow());
+    assert!(acquired.delivered.thinned > 0, "{acquired}");
+    assert_eq!((acquired.delivered.received, acquired.delivered.overrun), (60_000, 0));
+    // The last block waits to be full.
+    let waiting = acquired.delivered.used() - heard.events.len() as u64;
+    assert!(waiting < BLOCK_EVENTS as u64, "{waiting}");
 }
 
 #[test]

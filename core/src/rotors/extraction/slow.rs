@@ -1,0 +1,94 @@
+//! What turns too slowly to pass anywhere twice, looked for in the middle of all that moves.
+
+use super::quarters::{COARSEST_LOG2, LEAST_COMPANY};
+use super::{Extraction, For, Scratch, Stage, View};
+use crate::rotors::belief::believe;
+use crate::rotors::disc::Disc;
+use crate::rotors::heat::CellGrid;
+use crate::rotors::lines::Line;
+use crate::rotors::sweep::Sweep;
+use crate::speed::polar::{PolarTrack, track};
+use crate::store::Even;
+
+/// How far beside its centre a disc is swept from, in radii.
+const BESIDE: f32 = 0.5;
+
+impl Extraction {
+    /// Where nothing passes anywhere twice, what turns slowly is looked for in the middle of all that moves.
+    pub(super) fn moving(&mut self, view: &View<'_>, scratch: &mut Scratch) {
+        let Some(filling) = &mut self.filling else {
+            if self.grid.is_empty() {
+                self.grid = view.grid;
+            }
+            return self.start_filling(scratch);
+        };
+        let filled = scratch.visits.fill(&view.window, &[], filling);
+        let Some((_, company)) = filled else { return };
+        self.filling = None;
+        if company < LEAST_COMPANY && self.grid.cell_log2 < COARSEST_LOG2 {
+            self.grid = self.grid.coarser();
+            return;
+        }
+        self.stage = Stage::Heat;
+    }
+
+    pub(super) fn heat(&mut self, view: &mut View<'_>, scratch: &Scratch) {
+        scratch.visits.heat(view.weights.get_mut(..self.grid.len()).unwrap_or_default());
+        self.looked_for = For::Slow;
+        self.stage = Stage::Seed;
+    }
+
+    pub(super) fn start_track(&mut self, all: Disc) {
+        self.swept = Some(all);
+        // Seen from beside its centre: about the centre of n blades all harmonics but n and its multiples are silent.
+        self.disc = Disc { x_px: all.x_px + BESIDE * all.radius_px, ..all };
+        self.even = Even::default();
+        self.stage = Stage::Track;
+    }
+
+    pub(super) fn track(&mut self, view: &View<'_>, polar: &mut PolarTrack) {
+        if track(&view.window, self.disc, polar, &mut self.even) {
+            self.sweeping = Sweep::default();
+            self.stage = Stage::Sweep;
+        }
+    }
+
+    pub(super) fn sweep(&mut self, view: &View<'_>, polar: &PolarTrack) {
+        if self.sweeping.step(polar, view.window.duration_us) {
+            self.lines.clear();
+            for hz in core::mem::take(&mut self.sweeping).hz().into_iter().rev() {
+                self.lines.push(Line { hz, sigmas: 0.0 }).ok();
+            }
+            self.next_slow();
+        }
+    }
+
+    pub(super) fn next_slow(&mut self) {
+        let (Some(line), Some(disc)) = (self.lines.pop(), self.swept) else { return self.end() };
+        self.line = line;
+        self.look(For::Slow, disc);
+    }
+
+    /// One step of the look for the rotation of all that moves.
+    pub(super) fn slow(&mut self, scratch: &mut Scratch) {
+        if scratch.explainer.step() {
+            if let Some(found) = believe(&scratch.explainer, self.line.hz)
+                && within(self.grid, found.disc)
+            {
+                self.enter(found);
+            }
+            self.next_slow();
+        }
+    }
+}
+
+/// Whether a disc lies within the picture. What turns once and over all of the picture is the camera.
+fn within(grid: CellGrid, disc: Disc) -> bool {
+    let (width_px, height_px) =
+        (grid.columns as f32 * grid.cell_px(), grid.rows as f32 * grid.cell_px());
+    let Disc { x_px, y_px, radius_px } = disc;
+    x_px > radius_px
+        && y_px > radius_px
+        && x_px + radius_px < width_px
+        && y_px + radius_px < height_px
+}

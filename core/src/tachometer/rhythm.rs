@@ -1,0 +1,88 @@
+//! How often what is looked at: a small memory stands for a small processor beside it.
+
+use crate::limits::DEVICE_EVENTS;
+
+/// When the next window is measured, and when the image is searched again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Rhythm {
+    /// Segments that fill while a window is measured.
+    pub spare: usize,
+    /// Readings until the whole image is searched again while rotors are followed.
+    pub search_every: u8,
+    /// Readings until what is beside them is searched in between.
+    beside_every: u8,
+    /// Time by which the window moves on from reading to reading on average, as far as segments go, in microseconds.
+    hop_us: u32,
+    /// Part of that which the last hop left over.
+    left_us: u32,
+}
+
+/// Fewest segments by which the window moves on: 50 ms of a window of 150 ms.
+const LEAST_HOP: u32 = 2;
+/// Most, so that windows overlap.
+const MOST_HOP: u32 = 4;
+
+impl Rhythm {
+    /// The rhythm with room for so many events.
+    ///
+    /// On the device a reading takes about 50 ms, beside the taking in of a million events a second, and a search many times as
+    /// long: eleven readings a second leave it time.
+    pub const fn of(events: usize) -> Self {
+        let pc = Self { spare: 2, search_every: 10, beside_every: 10, hop_us: 50_000, left_us: 0 };
+        if events > DEVICE_EVENTS {
+            pc
+        } else {
+            Self { spare: 4, search_every: 120, beside_every: 30, hop_us: 87_500, ..pc }
+        }
+    }
+
+    /// Whether what is beside the rotors is searched, with so many readings left until the whole image is.
+    pub const fn searches_beside(&self, until_search: u8) -> bool {
+        until_search < self.search_every && until_search.is_multiple_of(self.beside_every)
+    }
+
+    /// Segments of `segment_us` microseconds by which the window moves on now.
+    pub fn hop(&mut self, segment_us: u32) -> usize {
+        let due_us = self.left_us + self.hop_us;
+        let hop = (due_us / segment_us).clamp(LEAST_HOP, MOST_HOP);
+        self.left_us = due_us.saturating_sub(hop * segment_us).min(segment_us);
+        hop as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tachometer::{BASE_WINDOW_US, LONGEST_WINDOW_US, segment_us};
+
+    extern crate std;
+    use std::vec::Vec;
+
+    fn hops(events: usize, window_us: u32) -> Vec<usize> {
+        let mut rhythm = Rhythm::of(events);
+        (0..4).map(|_| rhythm.hop(segment_us(window_us))).collect()
+    }
+
+    #[test]
+    fn the_device_reads_more_than_ten_times_a_second_and_a_pc_twenty_times() {
+        assert_eq!(hops(DEVICE_EVENTS, BASE_WINDOW_US), [3, 4, 3, 4]);
+        assert_eq!(hops(16 * DEVICE_EVENTS, BASE_WINDOW_US), [2, 2, 2, 2]);
+    }
+
+    #[test]
+    fn long_windows_move_on_by_a_third_and_short_ones_still_overlap() {
+        for events in [DEVICE_EVENTS, 16 * DEVICE_EVENTS] {
+            assert_eq!(hops(events, LONGEST_WINDOW_US), [2, 2, 2, 2]);
+        }
+        assert_eq!(hops(DEVICE_EVENTS, 30_000), [4, 4, 4, 4]);
+    }
+
+    #[test]
+    fn what_is_beside_is_searched_between_two_searches_of_the_whole() {
+        let device = Rhythm::of(DEVICE_EVENTS);
+        let beside = (1..=device.search_every).filter(|left| device.searches_beside(*left));
+        assert_eq!(beside.collect::<Vec<_>>(), [30, 60, 90]);
+        let pc = Rhythm::of(16 * DEVICE_EVENTS);
+        assert!((1..=pc.search_every).all(|left| !pc.searches_beside(left)));
+    }
+}

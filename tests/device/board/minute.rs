@@ -1,0 +1,98 @@
+//! A minute before a rotor that gives a million events a second: where they go, and what each part of the program costs.
+
+use evtach_host::synth::{Model, Rotor, Scene};
+use evtach_tests::{Loaded, show};
+use serde_json::Value;
+
+use crate::board::{Board, Camera};
+use crate::synthesise;
+
+/// Seconds of the minute.
+const SECONDS: u32 = 60;
+
+/// Rotations a minute: 48 ms a turn.
+const RPM: f64 = 1250.0;
+
+/// Time after which the recording comes again: 20 turns.
+const PERIOD_S: f64 = 0.96;
+
+/// One rotor, a million events a second, for as many turns as it takes to begin again.
+fn a_million_a_second() -> Loaded {
+    let rotor = Rotor { rpm: RPM, ..Rotor::default() };
+    let scene = Scene {
+        rotors: vec![rotor],
+        duration_ms: PERIOD_S * 1e3,
+        model: Model::Edge,
+        ..Scene::default()
+    };
+    let mut sees = synthesise(&scene);
+    sees.events.retain(|event| event.t_us < (PERIOD_S * 1e6) as u64);
+    sees
+}
+
+/// Instructions of each handler between two reports, in millions a second.
+fn loads(before: &Value, after: &Value) -> Vec<(String, f64)> {
+    let of = |report: &Value, name: &str| report["instructions"][name].as_f64().unwrap_or(0.0);
+    let seconds = |report: &Value| report["seconds"].as_f64().unwrap_or(0.0);
+    let took_s = seconds(after) - seconds(before);
+    let names = after["instructions"].as_object().into_iter().flatten();
+    names
+        .map(|(name, _)| (name.clone(), (of(after, name) - of(before, name)) / took_s * 1e-6))
+        .collect()
+}
+
+/// Answers that are numbers.
+fn counts(answer: &str) -> Vec<u64> {
+    answer.split(',').filter_map(|count| count.parse().ok()).collect()
+}
+
+#[test]
+fn a_minute_of_a_million_events_a_second_is_accounted_for_and_none_is_lost() {
+    let Some(mut board) = Board::switch_on() else { return };
+    let sees = a_million_a_second();
+    board.run(0.5);
+    board.plug_camera_for_good(Camera::Davis346, &sees, PERIOD_S);
+    board.wait_for(3.0, "SYST:SENS?", |answer| answer.starts_with("\"present\""));
+    let before = board.report();
+    board.serial("SYST:LOG ON");
+    let (mut readings, mut far) = (0, Vec::new());
+    for _ in 0..SECONDS {
+        board.run(1.0);
+        for line in board.read().lines() {
+            let reading: Value = serde_json::from_str(line).expect("a line of the log");
+            readings += 1;
+            for rotor in reading["rotors"].as_array().into_iter().flatten() {
+                let rpm = rotor["rpm"].as_f64().unwrap_or(0.0);
+                if (rpm / RPM - 1.0).abs() > 2e-3 {
+                    far.push(reading.to_string());
+                }
+            }
+        }
+    }
+    let after = board.report();
+    board.serial("SYST:LOG OFF");
+    board.cover();
+    // Twice a second the camera is asked what it dropped.
+    board.run(1.2);
+    board.read();
+    let camera = board.camera();
+    let fate = counts(&board.query("SYST:EVEN?"));
+    let [used, thinned, late, lost_before, overrun] = fate[..] else { unreachable!("{fate:?}") };
+    let seen = camera["seen"].as_u64().unwrap_or(0);
+    let mut table = format!(
+        "{seen} events in {SECONDS} s, {readings} readings: {used} used, {thinned} thinned, {late} late, {lost_before} \
+         lost by the camera, {overrun} lost for want of room; million instructions a second:"
+    );
+    for (handler, load) in loads(&before, &after) {
+        table.push_str(&format!("\n  {handler:16} {load:7.2}"));
+    }
+    show(&table);
+    assert!(seen > 1_000_000 * u64::from(SECONDS), "{camera}");
+    assert_eq!((&camera["filtered"], &camera["dropped"]), (&0.into(), &0.into()), "{camera}");
+    assert_eq!(used + thinned + late + lost_before + overrun, seen);
+    assert_eq!((lost_before, overrun), (0, 0));
+    assert!(used > 0 && thinned < seen / 3, "{fate:?} of {seen}");
+    assert!(readings > 100, "{readings}");
+    assert_eq!(far, Vec::<String>::new(), "speeds that are far off");
+    board.assert_sound();
+}
