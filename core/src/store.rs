@@ -2,9 +2,11 @@
 //!
 //! Time is cut into segments of equal length; [`WINDOW_SEGMENTS`] of them are the window, and
 //! a few more take in events while the window is measured; when these are full, the oldest of them is given up, so that
-//! what stands behind the window is always the latest, without a gap. A segment first keeps a dense
-//! burst of consecutive events (what a registration of neighbouring slices needs), then, octave by octave, every
-//! second, fourth and eighth event, so that the baseline grows geometrically from the burst on; what is left of
+//! what stands behind the window is always the latest, without a gap. A segment
+//! keeps all its events until it is full; then every second one behind a dense burst of consecutive events goes, and so on as it
+//! fills again. The burst (what a registration of
+//! neighbouring slices needs) stays, and behind it one octave each time: every second, fourth and eighth event, so that
+//! the baseline grows geometrically from the burst on; what is left of
 //! its memory is a reservoir thinned evenly (what a long baseline needs): every 2^s-th event, s growing as
 //! the reservoir fills. What is kept depends on the events and the capacity alone, never on when a task ran.
 

@@ -1,10 +1,11 @@
 //! Longer segments out of shorter ones.
 
 use super::event::MOST_WEIGHT_LOG2;
+use super::open::{as_they_came, level};
 use super::{MOST_SEGMENTS, Segment, Store};
 
 impl Store<'_> {
-    /// Makes segments longer, keeping what is stored: each new segment keeps the burst of the first old one in
+    /// Makes segments longer, keeping what is stored: each new segment keeps the burst and the octaves of the first old one in
     /// it, and of the rest every event that stands for as many as the new reservoir's stride says.
     /// `segment_us` is at least the length so far. Cost: two passes over the store.
     pub fn lengthen(&mut self, segment_us: u32) {
@@ -16,7 +17,7 @@ impl Store<'_> {
         for new in 0..=closed {
             let end_us = ((new as u64 + 1) * u64::from(segment_us)).min(i32::MAX as u64) as i32;
             let mut merged = self.plan_merge(&old, (from, index), end_us);
-            let stride = 1_u64 << merged.stride_log2;
+            let burst = as_they_came(self.capacity, merged.stride_log2);
             let first = from;
             let (mut passed, mut next) = (0_u64, 0_u64);
             let base = self.slot(new) * self.capacity;
@@ -29,17 +30,16 @@ impl Store<'_> {
                         break;
                     }
                     index += 1;
-                    let in_burst = from == first && merged.len < self.burst();
-                    let kept = in_burst || passed >= next;
-                    if !in_burst {
-                        passed += 1 << event.weight_log2();
-                    }
+                    let level = if from == first && merged.len < burst {
+                        level(self.capacity, merged.len)
+                    } else {
+                        merged.stride_log2
+                    };
+                    let kept = passed >= next;
+                    passed += 1 << event.weight_log2();
                     if kept && merged.len < self.capacity {
-                        if !in_burst {
-                            next += stride;
-                        }
-                        let weight =
-                            if in_burst { event.weight_log2() } else { merged.stride_log2 };
+                        let weight = event.weight_log2().max(level);
+                        next += 1 << weight;
                         self.events[base + merged.len] = event.weighing(weight);
                         merged.len += 1;
                     } else {
@@ -78,10 +78,11 @@ impl Store<'_> {
         end_us: i32,
     ) -> Segment {
         let mut weight = 0_u64;
-        let mut stride_log2 = Segment::default().stride_log2;
+        let mut stride_log2 = 0;
         for (i, segment) in old.iter().enumerate().take(self.closed + 1).skip(from) {
             let source = self.slot(i) * self.capacity;
-            let skipped = if i == from { index + self.burst() } else { 0 };
+            let burst = as_they_came(self.capacity, 0);
+            let skipped = if i == from { index + burst } else { 0 };
             for event in &self.events[source..source + segment.len][skipped.min(segment.len)..] {
                 if event.since(self.start_us) >= end_us {
                     break;
@@ -90,8 +91,8 @@ impl Store<'_> {
                 stride_log2 = stride_log2.max(event.weight_log2());
             }
         }
-        let room = (self.capacity - self.burst()).max(1) as u64;
-        while weight >> stride_log2 >= room && stride_log2 < MOST_WEIGHT_LOG2 {
+        let room = |stride_log2| self.capacity - as_they_came(self.capacity, stride_log2);
+        while weight >> stride_log2 >= room(stride_log2) as u64 && stride_log2 < MOST_WEIGHT_LOG2 {
             stride_log2 += 1;
         }
         Segment { stride_log2, ..Segment::default() }

@@ -6,11 +6,11 @@ use crate::event::PackedEvent;
 
 /// Sixteenths of a segment that keep consecutive events.
 const DENSE_SIXTEENTHS: usize = 4;
-/// Sixteenths before the reservoir starts.
-const BURST_SIXTEENTHS: usize = 7;
+/// Sixteenths that keep every second, every fourth and every eighth, each in one.
+const OCTAVES: u8 = 3;
 
 /// What is known of a segment beside its events.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Segment {
     /// Events kept.
     pub len: usize,
@@ -20,31 +20,10 @@ pub(super) struct Segment {
     pub lost: u64,
     pub roll_sum_rad_s: f32,
     pub roll_count: u32,
-    /// The reservoir keeps every 2^stride_log2-th event.
+    /// Every 2^stride_log2-th event is kept.
     pub stride_log2: u8,
     /// Events to pass over before the next is kept.
     pub skip: u32,
-    /// Until so many are kept, every 2^step_log2-th event is.
-    pub until: usize,
-    pub step_log2: u8,
-}
-
-impl Default for Segment {
-    fn default() -> Self {
-        // Where the octaves end, the reservoir goes on as densely as the last of them.
-        let stride_log2 = (BURST_SIXTEENTHS - DENSE_SIXTEENTHS) as u8;
-        Self {
-            len: 0,
-            counted: 0,
-            lost: 0,
-            roll_sum_rad_s: 0.0,
-            roll_count: 0,
-            stride_log2,
-            skip: 0,
-            until: 0,
-            step_log2: 0,
-        }
-    }
 }
 
 impl Store<'_> {
@@ -64,15 +43,15 @@ impl Store<'_> {
         let (mut next, mut rest) = ((skip >> weight_log2) as usize, skip);
         let mut count = 0;
         while next < events.len() {
-            if self.segments[slot].len >= self.segments[slot].until {
-                self.turn(slot);
+            if self.segments[slot].len >= self.capacity {
+                self.make_room(slot);
             }
             let segment = &mut self.segments[slot];
-            let step_log2 = segment.step_log2;
+            let step_log2 = segment.stride_log2;
             let stride_log2 = step_log2.saturating_sub(weight_log2);
             let stands_log2 = step_log2.max(weight_log2);
             let base = slot * self.capacity;
-            let places = self.events.get_mut(base + segment.len..base + segment.until);
+            let places = self.events.get_mut(base + segment.len..base + self.capacity);
             let places = places.unwrap_or_default();
             // As many as go by the same step.
             let every = events[next..].iter().step_by(1 << stride_log2);
@@ -98,37 +77,21 @@ impl Store<'_> {
         self.thinned += arrived - count as u64;
     }
 
-    /// Chooses how many events the next ones stand for, and up to where; a full segment makes room first.
+    /// Makes room in a full segment: every other event behind the burst goes.
     #[cold]
-    fn turn(&mut self, slot: usize) {
-        let (base, burst, octave) = (slot * self.capacity, self.burst(), self.capacity / 16);
+    fn make_room(&mut self, slot: usize) {
+        let base = slot * self.capacity;
         let segment = &mut self.segments[slot];
-        if segment.len == self.capacity {
-            let reservoir = &mut self.events[base + burst..base + self.capacity];
-            let mut kept = reservoir.len();
-            while kept == reservoir.len() && segment.stride_log2 < MOST_WEIGHT_LOG2 {
-                segment.stride_log2 += 1;
-                kept = thin(reservoir, segment.stride_log2);
-            }
-            kept = kept.min(reservoir.len().saturating_sub(1));
-            self.thinned += (reservoir.len() - kept) as u64;
-            segment.len = burst + kept;
+        let first = as_they_came(self.capacity, segment.stride_log2);
+        let sparser = &mut self.events[base + first..base + self.capacity];
+        let mut kept = sparser.len();
+        while kept == sparser.len() && segment.stride_log2 < MOST_WEIGHT_LOG2 {
+            segment.stride_log2 += 1;
+            kept = thin(sparser, segment.stride_log2);
         }
-        let part = segment.len.checked_div(octave).unwrap_or(0);
-        (segment.step_log2, segment.until) = if octave == 0 {
-            (0, self.capacity)
-        } else if part < DENSE_SIXTEENTHS {
-            (0, DENSE_SIXTEENTHS * octave)
-        } else if part < BURST_SIXTEENTHS {
-            ((part - DENSE_SIXTEENTHS + 1) as u8, (part + 1) * octave)
-        } else {
-            (segment.stride_log2, self.capacity)
-        };
-    }
-
-    /// Events of a segment that come before its reservoir.
-    pub(super) const fn burst(&self) -> usize {
-        BURST_SIXTEENTHS * (self.capacity / 16)
+        kept = kept.min(sparser.len().saturating_sub(1));
+        self.thinned += (sparser.len() - kept) as u64;
+        segment.len = first + kept;
     }
 }
 
@@ -147,4 +110,20 @@ fn thin(events: &mut [StoredEvent], weight_log2: u8) -> usize {
         passed = after;
     }
     kept
+}
+
+/// Events at a segment's start that stay as they are when those behind them are thinned from one in 2^stride_log2 to half of
+/// that: the dense burst, and one octave more each time, up to where the reservoir starts.
+pub(super) const fn as_they_came(capacity: usize, stride_log2: u8) -> usize {
+    let octaves = if stride_log2 < OCTAVES { stride_log2 } else { OCTAVES };
+    (DENSE_SIXTEENTHS + octaves as usize) * (capacity / 16)
+}
+
+/// What an event at this place of a segment stands for at least once all behind the burst is thinned, as a power of two.
+pub(super) const fn level(capacity: usize, place: usize) -> u8 {
+    let mut level = 0;
+    while level < OCTAVES && place >= as_they_came(capacity, level) {
+        level += 1;
+    }
+    level
 }

@@ -33,6 +33,29 @@ fn a_segment_keeps_a_dense_burst_then_thins_evenly_and_counts_all() {
 }
 
 #[test]
+fn a_segment_that_is_not_full_keeps_all() {
+    let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
+    let mut store = Store::new(&mut memory, MOST_SPARE, 100);
+    fill(&mut store, 0..64);
+    assert_eq!(times(&store), (0..64).collect::<Vec<_>>());
+    let one = |event: StoredEvent| event.weight_log2() == 0;
+    assert!(store.window(1, u64::MAX).events().all(one));
+}
+
+#[test]
+fn behind_the_burst_each_octave_is_half_as_dense() {
+    let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
+    let mut store = Store::new(&mut memory, MOST_SPARE, 100_000);
+    fill(&mut store, 0..5_000);
+    // What a kept event stands for is what goes before the next.
+    let window = store.window(1, u64::MAX);
+    let kept: Vec<_> = window.events().map(|e| (e.since(0), 1 << e.weight_log2())).collect();
+    assert!(kept.windows(2).all(|pair| pair[1].0 - pair[0].0 == pair[0].1), "{kept:?}");
+    let octaves: Vec<i32> = [16, 20, 24].map(|i| kept[i].1).into();
+    assert_eq!(octaves, [2, 4, 8]);
+}
+
+#[test]
 fn even_events_stand_for_the_same_number_each() {
     let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
     let mut store = Store::new(&mut memory, MOST_SPARE, 10_000);

@@ -22,6 +22,7 @@ pub const MOST_FINE_WALK: f32 = 1.5;
 pub const WALK_PX: f32 = 0.5;
 /// The same for a rotor with a single mark, whose shift and turn look alike.
 pub const WALK_SINGLE_PX: f32 = 0.05;
+/// Turn beyond an even one from knot to knot, in radians.
 const WALK_RAD: f32 = 0.02;
 /// Farthest that a knot is moved at once.
 const STRIDE_PX: f32 = 3.0;
