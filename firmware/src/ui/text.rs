@@ -187,6 +187,10 @@ mod tests {
                 let entry = source.font.charmap.get(&key);
                 let glyph = packed.set(&key).next().map(|(_, glyph)| glyph);
                 let glyph = glyph.expect(&key);
+                if entry.key != key {
+                    assert_eq!((glyph.width, glyph.advance_px), (0, 0.0), "a gap in the row");
+                    continue;
+                }
                 let image = entry.glyph.images.get(0).mul_offset(1, -1);
                 let levels: Vec<u8> =
                     image.colors().into_iter().map(|level| level.luma()).collect();
@@ -199,7 +203,7 @@ mod tests {
                 let size = Size::new(glyph.width.into(), glyph.height.into());
                 assert_eq!(Rectangle::new(corner, size), image.bounding_box(), "{letter}");
                 assert_eq!(glyph.advance_px, (entry.advance_width_to)(""), "{letter}");
-                letters += usize::from(entry.key == key);
+                letters += 1;
             }
             assert!(letters >= 12, "{} has {letters}", source.name);
         }
