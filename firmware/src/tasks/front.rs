@@ -103,18 +103,17 @@ impl<R: Recording, P: Panel> Front<R, P> {
 
     /// Draws what has changed.
     pub fn draw(&mut self, screen: &mut Screen) {
+        self.look(screen);
+        while self.draw_next(screen) {}
+    }
+
+    /// Looks at what is to be drawn, for [`draw_next`](Self::draw_next).
+    pub(super) fn look(&mut self, screen: &mut Screen) {
         // No picture more often than it is drawn: taking one costs measuring a quarter of a million instructions.
         if let Ok(picture) = self.shared.taken.try_receive() {
             self.instrument.show_picture(picture);
             self.shared.blank.try_send(picture).ok();
         }
-        // A panel that fails is drawn whole the next time.
-        screen.draw(&mut self.panel, &self.instrument).ok();
-        self.panel.present();
-    }
-
-    /// Looks at what is to be drawn, for [`draw_next`](Self::draw_next).
-    pub(super) fn look(&self, screen: &mut Screen) {
         screen.look(&self.instrument);
     }
 
