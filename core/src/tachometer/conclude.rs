@@ -93,7 +93,9 @@ impl Tachometer<'_> {
         let wanted =
             if status.reason().is_some() { wanted.max(1.5 * window_us as f32) } else { wanted };
         let adapts = self.settings.window_us.is_none();
-        if adapts && wanted > window_us as f32 * 1.02 && window_us < LONGEST_WINDOW_US {
+        // Six whole segments may fall short of the longest window by some microseconds.
+        let longest = self.store.segment_us() >= segment_us(LONGEST_WINDOW_US);
+        if adapts && wanted > window_us as f32 * 1.02 && !longest {
             let longer = WINDOWS_US.iter().find(|w| **w as f32 >= wanted);
             self.target_us = longer.copied().unwrap_or(LONGEST_WINDOW_US);
             self.store.lengthen(segment_us(self.target_us));
