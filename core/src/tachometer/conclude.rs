@@ -101,9 +101,6 @@ impl Tachometer<'_> {
             self.store.lengthen(segment_us(self.target_us));
             // It is longer for a rotor that is not locked, and only those are followed.
             self.until_search = 0;
-        } else if status.reason().is_some() && adapts {
-            // Nothing even in the longest window: begin again with a short one.
-            self.restart(self.last_us);
         } else if !torn {
             let hop = self.rhythm.hop(self.store.segment_us());
             for _ in 0..hop {
