@@ -67,7 +67,7 @@ impl Measurement {
             .map(|lock| self.with_bias(lock));
         let phase = witness(self.evidence.phase_rad_s, self.evidence.phase_sigma_rad_s);
         let window_s = window.duration_us as f32 * 1e-6;
-        let held_up = QUEUE_SIGMA * stretch(window);
+        let held_up = QUEUE_SIGMA * stretch(window, self.disc, self.evidence.periods);
         if let (Some(lock), Some(phase)) = (lock, phase) {
             let apart = (lock.omega_rad_s - phase.omega_rad_s).abs();
             let sigma =
