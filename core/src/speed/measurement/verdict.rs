@@ -210,8 +210,8 @@ impl Measurement {
     }
 }
 
-/// Mean weighted by the inverse variances. The witnesses look at the same events, so the error is not taken to
-/// shrink by having two.
+/// Mean weighted by the inverse variances. The witnesses look at the same events, so their errors are taken for one: it
+/// does not shrink by having two.
 fn combine(a: Estimate, b: Estimate) -> Estimate {
     let (va, vb) = (a.sigma_rad_s * a.sigma_rad_s, b.sigma_rad_s * b.sigma_rad_s);
     let (wa, wb) = (vb / (va + vb), va / (va + vb));
@@ -219,7 +219,7 @@ fn combine(a: Estimate, b: Estimate) -> Estimate {
     let apart = (a.omega_rad_s - b.omega_rad_s) * (a.omega_rad_s - b.omega_rad_s) / (va + vb);
     Estimate {
         omega_rad_s: a.omega_rad_s * wa + b.omega_rad_s * wb,
-        sigma_rad_s: sqrt((wa * va + wb * vb) * apart.max(1.0)),
+        sigma_rad_s: (wa * a.sigma_rad_s + wb * b.sigma_rad_s) * sqrt(apart.max(1.0)),
     }
 }
 
