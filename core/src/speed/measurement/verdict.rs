@@ -197,6 +197,12 @@ impl Measurement {
         }
     }
 
+    /// Whether all segments turn alike, as far as registration tells.
+    fn rates_alike(&self, omega: f32) -> bool {
+        let alike = |rate: &f32| (rate - omega).abs() < COARSE_SPREAD * omega.abs();
+        !self.rates.is_empty() && self.rates.iter().all(alike)
+    }
+
     /// Whether a reading without a lock may stand: it has no long baseline to contradict it, so the phase must advance
     /// evenly through the window, and all segments must turn alike.
     fn coarse_stands(&self, phase: Option<Estimate>) -> bool {
@@ -205,8 +211,7 @@ impl Measurement {
             (phase.omega_rad_s - omega).abs() < COARSE_PHASE * omega.abs()
                 && phase.sigma_rad_s < COARSE_PHASE_SIGMA * omega.abs()
         });
-        let alike = |rate: &f32| (rate - omega).abs() < COARSE_SPREAD * omega.abs();
-        even && !self.doubted() && (self.rates.iter().all(alike) || self.sharp())
+        even && !self.doubted() && (self.rates_alike(omega) || self.sharp())
     }
 }
 
