@@ -17,6 +17,8 @@ const MOST_BLUR: (f32, f32) = (0.1, 1.5);
 const LEAST_BLUR: (f32, f32) = (0.06, 1.3);
 /// Standard deviation of the events' times in dim light.
 const MOST_JITTER_S: f32 = 150e-6;
+/// Scatter of a phase by that jitter beyond which a registration is not believed where it contradicts.
+const MOST_SCATTER_RAD: f32 = 0.8;
 /// Blur that a jitter of one pixel makes as the pose measures it, where the harmonic rises by doubling: up to half an octave
 /// past the best, where 1 / (m exp(-m^2 / 2)) is 1.9.
 const BLUR_OF_JITTER: f32 = 1.9;
@@ -68,17 +70,14 @@ impl Measurement {
         let phase = witness(self.evidence.phase_rad_s, self.evidence.phase_sigma_rad_s);
         let window_s = window.duration_us as f32 * 1e-6;
         let held_up = QUEUE_SIGMA * stretch(window, self.disc, self.evidence.periods);
+        // What jitter leads astray says nothing.
+        let lock = lock.filter(|lock| self.registers() || self.bears_out(*lock, phase));
         if let (Some(lock), Some(phase)) = (lock, phase) {
-            let apart = (lock.omega_rad_s - phase.omega_rad_s).abs();
-            let sigma =
-                sqrt(lock.sigma_rad_s * lock.sigma_rad_s + phase.sigma_rad_s * phase.sigma_rad_s);
-            let agree = apart < (LOCK_AGREEMENT * lock.omega_rad_s.abs()).max(LOCK_SIGMAS * sigma);
-            let whole = self.fits_between();
             let both = combine(lock, phase);
             let sharp = both.sigma_rad_s.max(held_up * both.omega_rad_s.abs())
                 < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
             let long = self.wanted_us <= 1.02 * window.duration_us as f32;
-            if !agree || !whole {
+            if !self.bears_out(lock, Some(phase)) {
                 self.status = Status::Refused(Reason::Ambiguous);
             } else if sharp && long {
                 self.estimate = both;
@@ -118,6 +117,23 @@ impl Measurement {
         let late = held_up * self.estimate.omega_rad_s;
         self.estimate.sigma_rad_s = sqrt(own * own + late * late + clock * clock);
         self.roll_sigma_rad_s = roll;
+    }
+
+    /// Whether the lock bears the phase out, and the rotor is where it should be between whole periods.
+    fn bears_out(&self, lock: Estimate, phase: Option<Estimate>) -> bool {
+        phase.is_some_and(|phase| {
+            let apart = (lock.omega_rad_s - phase.omega_rad_s).abs();
+            let (a, b) = (lock.sigma_rad_s, phase.sigma_rad_s);
+            let most = LOCK_SIGMAS * sqrt(a * a + b * b);
+            apart < (LOCK_AGREEMENT * lock.omega_rad_s.abs()).max(most) && self.fits_between()
+        })
+    }
+
+    /// Whether jitter may scatter the blades' edges over so much of their distance that a registration matches noise: no overtone is
+    /// left of them. Then the phase alone tells, by all events of the window.
+    pub(super) fn registers(&self) -> bool {
+        let scatter_rad = self.harmonic as f32 * self.omega_rad_s.abs() * MOST_JITTER_S;
+        scatter_rad < MOST_SCATTER_RAD || self.pose.has_overtone() || self.doubted()
     }
 
     /// Whether the rotor is also where it should be between whole periods, where an alias is not.
