@@ -11,11 +11,12 @@ mod evt3;
 mod high;
 mod inivation;
 
-pub use davis::{Davis, Mounting};
+pub use davis::Davis;
 pub use dvxplorer::Dvxplorer;
 pub use evt2::Evt2;
 pub use evt3::Evt3;
 pub use evt21::Evt21;
+pub use inivation::Mounting;
 
 use crate::event::{GyroSample, Polarity};
 
