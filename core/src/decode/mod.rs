@@ -34,6 +34,18 @@ pub struct Packed {
     pub reset: bool,
 }
 
+/// What Prophesee's words told beside events, since the start of the stream.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Counts {
+    /// Times the wire's clock wrapped: after 2^34 us in EVT 2.0 and 2.1, after 2^24 us in EVT 3.0.
+    pub wraps: u32,
+    /// Events dropped because no time word had come yet.
+    pub untimed: u64,
+    /// Words of a type the format does not define: many of them mean that this is another format, or another byte order.
+    pub unknown: u64,
+}
+
 /// The polarity a wire bit stands for: set means brighter in every format read here.
 #[inline]
 const fn polarity(on: bool) -> Polarity {
