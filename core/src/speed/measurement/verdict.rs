@@ -165,18 +165,19 @@ impl Measurement {
         if self.in_doubt() {
             return false;
         }
-        if self.scatter_rad() > NO_EDGE_RAD && !self.doubted() {
-            // So many keep step as do at this speed, which was asked before, and no more is to be seen.
-            return true;
-        }
-        self.edges_px() < self.blur_px(MOST_BLUR)
+        self.too_fast_for_edges() || self.edges_px() < self.blur_px(MOST_BLUR)
+    }
+
+    /// Whether so many events keep step as do at this speed, which was asked before, and no more is to be seen.
+    fn too_fast_for_edges(&self) -> bool {
+        self.scatter_rad() > NO_EDGE_RAD && !self.doubted()
     }
 
     /// Whether the edges are so sharp that a registration that went astray does not count against them. Noise, which leads it
     /// astray, is no blur where no other harmonic keeps step.
     pub(super) fn sharp(&self) -> bool {
         let blur_px = if self.doubted() { self.pose.sharpness_px() } else { self.edges_px() };
-        blur_px < self.blur_px(LEAST_BLUR)
+        self.too_fast_for_edges() || blur_px < self.blur_px(LEAST_BLUR)
     }
 
     /// How sharp the edges are. A single mark is told from its axis's shaking by its sharpness alone, so noise counts against it.
