@@ -1,7 +1,7 @@
 //! Prophesee EVT 2.0: one event in a 32-bit word.
 
 use super::high::HighClock;
-use super::polarity;
+use super::{Counts, polarity};
 use crate::event::{Event, PackedEvent};
 
 /// Bits above them tell what a word is.
@@ -60,45 +60,32 @@ impl Evt2 {
                 filled += run;
             }
             let Some(word) = words.get(taken) else { return (taken, filled) };
-            self.decode(u32::from_le_bytes(*word), |event| {
-                if let Some(place) = places.get_mut(filled) {
-                    *place = PackedEvent::pack(&event);
-                    filled += 1;
-                }
-            });
+            // No event, or one before the first time.
+            self.decode(u32::from_le_bytes(*word), drop);
             taken += 1;
         }
     }
 
-    /// Times the wire's clock wrapped.
+    /// What the words told beside events.
     #[must_use]
-    pub const fn wraps(&self) -> u32 {
-        self.clock.wraps()
-    }
-
-    /// Events dropped because no time word had come yet.
-    #[must_use]
-    pub const fn untimed(&self) -> u64 {
-        self.untimed
-    }
-
-    /// Words of a type the format does not define: many of them mean that this is not EVT 2.0.
-    #[must_use]
-    pub const fn unknown(&self) -> u64 {
-        self.unknown
+    pub const fn counts(&self) -> Counts {
+        Counts { wraps: self.clock.wraps(), untimed: self.untimed, unknown: self.unknown }
     }
 }
 
 /// Packs events up to the first word that is none, and returns how many.
+// Not inlined, so that all it needs stays in registers.
+#[inline(never)]
 fn pack_run(words: &[[u8; 4]], places: &mut [PackedEvent], base_us: u32) -> usize {
-    let mut run = 0;
     let fours = words.as_chunks::<4>().0.iter().zip(places.as_chunks_mut::<4>().0);
+    let mut run = 0;
     for (words, places) in fours {
-        let [a, b, c, d] = words.map(u32::from_le_bytes);
+        let words = words.map(u32::from_le_bytes);
+        let [a, b, c, d] = words;
         if !is_event(a | b | c | d) {
             break;
         }
-        *places = [a, b, c, d].map(|word| pack(word, base_us));
+        *places = words.map(|word| pack(word, base_us));
         run += 4;
     }
     for (word, place) in words.iter().zip(places).skip(run) {
@@ -120,8 +107,7 @@ const fn is_event(word: u32) -> bool {
 
 #[inline(always)]
 const fn pack(word: u32, base_us: u32) -> PackedEvent {
-    let (x, y) = (word >> 11 & 0x7ff, word & 0x7ff);
-    PackedEvent::of_pixel(base_us | word >> 22 & 0x3f, (word >> PAYLOAD_BITS) << 31 | y << 16 | x)
+    PackedEvent::of_word(base_us | word >> 22 & 0x3f, word)
 }
 
 #[cfg(test)]
@@ -156,7 +142,7 @@ mod tests {
                 Event { t_us: 3 * 64 + 6, x: 7, y: 2047, polarity: Polarity::Off },
             ]
         );
-        assert_eq!(decoder.untimed(), 1);
+        assert_eq!(decoder.counts().untimed, 1);
     }
 
     #[test]
@@ -165,7 +151,7 @@ mod tests {
         let (events, decoder) = decode(&[8 << 28 | last, cd(0, 63, 1, 1), 8 << 28, cd(0, 0, 1, 1)]);
         assert_eq!(events[0].t_us, (1 << 34) - 1);
         assert_eq!(events[1].t_us, 1 << 34);
-        assert_eq!(decoder.wraps(), 1);
+        assert_eq!(decoder.counts().wraps, 1);
     }
 
     #[test]
@@ -173,6 +159,6 @@ mod tests {
         let (events, decoder) =
             decode(&[8 << 28 | 100, cd(0, 0, 1, 1), 8 << 28 | 99, cd(0, 0, 1, 1)]);
         assert_eq!(events[1].t_us, 99 * 64);
-        assert_eq!(decoder.wraps(), 0);
+        assert_eq!(decoder.counts().wraps, 0);
     }
 }
