@@ -1,7 +1,8 @@
 //! Registration at ever longer baselines: refinement, lock, and the test that tells an alias.
 
 use super::super::baseline::{Effort, Estimate, Pace, Pairs};
-use super::{COARSE_AGREEMENT, Measurement, Stage};
+use super::coarse::COARSE_AGREEMENT;
+use super::{Measurement, Stage};
 use crate::limits::SLICE_POINTS;
 use crate::reading::Reason;
 use crate::registration::Icp;
