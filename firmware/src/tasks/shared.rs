@@ -131,8 +131,10 @@ impl Shared {
     #[must_use]
     pub(super) fn fate(&self) -> Fate {
         let Standing { received, thinned, lost_before, overrun, .. } = self.standing();
-        let late = self.late.lock(Cell::get);
-        let used = received.saturating_sub(thinned).saturating_sub(late);
+        // What came late is counted with what was thinned before, which each event stands for: that is counted once.
+        let came = received.saturating_sub(thinned);
+        let late = self.late.lock(Cell::get).min(came);
+        let used = came - late;
         Fate { used, thinned, late, lost_before, overrun }
     }
 
