@@ -178,6 +178,8 @@ fn take(
 
 /// The median of values, which it sorts.
 #[must_use]
+// Not inlined: it is called in several places.
+#[inline(never)]
 pub fn median(values: &mut [f32]) -> Option<f32> {
     sort_few(values, |a, b| a < b);
     let middle = values.len() / 2;

@@ -221,6 +221,8 @@ impl Measurement {
     }
 
     /// Symmetry periods in the window, and the window that a lock needs.
+    // Not inlined: it is called in several places.
+    #[inline(never)]
     fn count_periods(&mut self, window: &Window<'_>) -> f32 {
         let revolutions = self.omega_rad_s.abs() * window.duration_us as f32 * 1e-6 / TAU;
         let periods = revolutions * f32::from(self.parts.unwrap_or(1));

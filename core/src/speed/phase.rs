@@ -50,6 +50,8 @@ impl Pattern {
 
     /// Share of events in step, 0 to 1, corrected for what chance gives.
     #[must_use]
+    // Not inlined: it is called in several places.
+    #[inline(never)]
     pub fn coherence(&self) -> f32 {
         let mut in_step = 0.0;
         let mut total = 0.0;

@@ -4,6 +4,8 @@ use crate::math::sqrt;
 
 /// Mean and its standard error from the scatter; `None` for fewer than two values.
 #[must_use]
+// Not inlined: it is called in several places.
+#[inline(never)]
 pub fn mean_and_error(values: &[f32]) -> Option<(f32, f32)> {
     if values.len() < 2 {
         return None;
@@ -17,6 +19,8 @@ pub fn mean_and_error(values: &[f32]) -> Option<(f32, f32)> {
 /// 97.5 % point of Student's t over that of the normal distribution, so that +/- 1.96 sigma covers 95 %
 /// although sigma itself was estimated from few values.
 #[must_use]
+// Nor this.
+#[inline(never)]
 pub fn student_over_normal(degrees_of_freedom: usize) -> f32 {
     const FACTORS: [f32; 12] =
         [6.483, 2.195, 1.624, 1.416, 1.312, 1.248, 1.206, 1.177, 1.154, 1.137, 1.123, 1.112];

@@ -1,9 +1,12 @@
 //! The running measurement, step by step.
 
+use heapless::Vec;
+
 use super::{Job, Scratch, Suspect, Tachometer};
+use crate::limits::MAX_SUSPECTS;
 use crate::reading::{Reason, Status};
 use crate::rotors::extraction::{Extraction, View};
-use crate::rotors::{Disc, Visits};
+use crate::rotors::{Disc, Found, Visits};
 use crate::settings::Poll;
 use crate::speed::measurement::{Measurement, Outcome, Stated};
 use crate::tracker::Known;
@@ -73,10 +76,12 @@ impl Tachometer<'_> {
                 let Scratch::Search(scratch) = self.scratch else { return true };
                 if extraction.step(&mut view, self.polar, self.spectrum, scratch) {
                     self.in_step_hz = extraction.in_step_hz();
+                    for candidate in extraction.candidates() {
+                        suspect(&mut self.candidates, *candidate);
+                    }
                     // What a search missed this time comes last, where nothing else was measured in its place.
-                    let suspected = self.tracker.known().iter().filter_map(Known::suspected);
-                    for found in extraction.candidates().iter().copied().chain(suspected) {
-                        self.candidates.push(Suspect { found, followed: None }).ok();
+                    for found in self.tracker.known().iter().filter_map(Known::suspected) {
+                        suspect(&mut self.candidates, found);
                     }
                     self.measure_next(0);
                 }
@@ -148,4 +153,11 @@ impl Tachometer<'_> {
         };
         self.job = Job::Measure(next, measurement);
     }
+}
+
+/// Enters what is to be measured, while there is room.
+// Not inlined: it is called in two places.
+#[inline(never)]
+fn suspect(suspects: &mut Vec<Suspect, MAX_SUSPECTS>, found: Found) {
+    suspects.push(Suspect { found, followed: None }).ok();
 }

@@ -122,6 +122,8 @@ impl Measurement {
     }
 
     /// Whether the lock bears the phase out, and the rotor is where it should be between whole periods.
+    // Not inlined: it is called in several places.
+    #[inline(never)]
     fn bears_out(&self, lock: Estimate, phase: Option<Estimate>) -> bool {
         phase.is_some_and(|phase| {
             let apart = (lock.omega_rad_s - phase.omega_rad_s).abs();
@@ -185,6 +187,8 @@ impl Measurement {
         if self.parts == Some(1) { self.pose.sharpness_px() } else { self.pose.blur_px() }
     }
 
+    // Not inlined: it is called in several places.
+    #[inline(never)]
     fn blur_px(&self, (share, px): (f32, f32)) -> f32 {
         let radius_px = self.disc.radius_px;
         let jitter_px = 0.5 * radius_px * self.omega_rad_s.abs() * MOST_JITTER_S;
@@ -244,6 +248,8 @@ impl Measurement {
 
 /// Mean weighted by the inverse variances. The witnesses look at the same events, so their errors are taken for one: it
 /// does not shrink by having two.
+// Not inlined: it is called in several places.
+#[inline(never)]
 fn combine(a: Estimate, b: Estimate) -> Estimate {
     let (va, vb) = (a.sigma_rad_s * a.sigma_rad_s, b.sigma_rad_s * b.sigma_rad_s);
     let (wa, wb) = (vb / (va + vb), va / (va + vb));
