@@ -92,6 +92,12 @@ impl<'m> Store<'m> {
         self.segment_us
     }
 
+    /// Start of the oldest segment, in microseconds.
+    #[must_use]
+    pub const fn start_us(&self) -> u64 {
+        self.start_us
+    }
+
     /// First instant after the segment that is being filled.
     #[must_use]
     pub const fn open_end_us(&self) -> u64 {

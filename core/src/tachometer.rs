@@ -84,6 +84,21 @@ pub struct Tachometer<'m> {
     tracker: Tracker,
     /// Readings until the whole image is searched again.
     until_search: u8,
+    stretch: Stretch,
+    /// When the window begins anew, in microseconds; until then none is measured.
+    anew_us: Option<u64>,
+}
+
+/// Whether the window may be longer than what is in it needs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Stretch {
+    /// It is as long as the rotors wanted it.
+    #[default]
+    Wanted,
+    /// A longest window was refused: what has come into view since may do with less.
+    Blind,
+    /// It was begun short again, and none but a longest one has been locked since.
+    Tried,
 }
 
 impl<'m> Tachometer<'m> {
@@ -116,6 +131,8 @@ impl<'m> Tachometer<'m> {
             in_step_hz: None,
             tracker: Tracker::default(),
             until_search: 0,
+            stretch: Stretch::default(),
+            anew_us: None,
         }
     }
 
@@ -125,6 +142,7 @@ impl<'m> Tachometer<'m> {
         self.settings = settings;
         self.heat.resize(settings.geometry);
         self.tracker = Tracker::default();
+        self.stretch = Stretch::default();
         self.started = false;
         self.window_segments = 0;
         self.job = Job::Idle;

@@ -80,10 +80,12 @@ fn compare(model: Model, scene: Scene) {
     let geometry = model.geometry();
     let scene = Scene { width_px: geometry.width_px, height_px: geometry.height_px, ..scene };
     let events = synth::generate(&scene).expect("a scene in range").events;
-    // The DAVIS has a gyro, which says a thousand times a second that the camera does not roll.
-    let milliseconds = if model == Model::Davis346 { 0..scene.duration_ms as u64 } else { 0..0 };
-    let gyro: Vec<GyroSample> =
-        milliseconds.map(|ms| GyroSample { t_us: ms * 1_000, roll_rad_s: 0.0 }).collect();
+    // The gyro says a thousand times a second, or 800 times, that the camera does not roll.
+    let every_us = if model == Model::Davis346 { 1_000 } else { 1_250 };
+    let gyro: Vec<GyroSample> = (0..(scene.duration_ms * 1e3) as u64)
+        .step_by(every_us)
+        .map(|t_us| GyroSample { t_us, roll_rad_s: 0.0 })
+        .collect();
     let (here, _) = measure_events(&events, &gyro, Settings::new(geometry), Capacity::Device);
     let count = events.len() as u64;
     let (there, acquired) = read_over_usb(model, events);

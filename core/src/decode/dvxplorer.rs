@@ -1,8 +1,8 @@
 //! iniVation DVXplorer (640x480): 16-bit USB words with groups of eight pixels.
 
-use super::inivation::{CLOCK_RESET, Clock};
+use super::inivation::{CLOCK_RESET, Common, ImuMaker, Mounting};
 use super::{Packed, polarity};
-use crate::event::{Event, PackedEvent};
+use crate::event::{Event, GyroSample, PackedEvent};
 
 /// Pixels in a group, one above the other.
 const GROUP_PX: u16 = 8;
@@ -12,71 +12,64 @@ const ROWS: u16 = 480;
 /// Decoder of DVXplorer USB words (facts: libcaer, "dvxplorer").
 #[derive(Clone, Debug)]
 pub struct Dvxplorer {
-    clock: Clock,
+    common: Common,
+    swap_xy: bool,
     column: u16,
     /// First rows of the two groups that the next masks are for; `None` off the sensor.
     rows: [Option<u16>; 2],
-    unknown: u64,
-}
-
-impl Default for Dvxplorer {
-    fn default() -> Self {
-        Self::new()
-    }
 }
 
 impl Dvxplorer {
     /// A decoder at the start of a stream.
     #[must_use]
-    pub const fn new() -> Self {
-        Self { clock: Clock::new(), column: 0, rows: [None; 2], unknown: 0 }
+    pub const fn new(mounting: Mounting) -> Self {
+        let Mounting { swap_xy, flip_gyro_z } = mounting;
+        let common = Common::new(ImuMaker::Bosch, flip_gyro_z);
+        Self { common, swap_xy, column: 0, rows: [None; 2] }
     }
 
-    /// Takes in one word and hands out its events, up to 8.
+    /// Takes in one word, hands out its events, up to 8, and returns the gyro sample that it completes.
     #[inline]
-    pub fn decode(&mut self, word: u16, mut emit: impl FnMut(Event)) {
+    pub fn decode(&mut self, word: u16, mut emit: impl FnMut(Event)) -> Option<GyroSample> {
         if word & 0x8000 != 0 {
-            self.clock.low(word);
-            return;
+            self.common.clock.low(word);
+            return None;
         }
         let data = word & 0x0fff;
         match word >> 12 {
             1 => self.column = data & 0x3ff,
             code @ (2 | 3) => {
-                let Some(row) = self.rows[usize::from(code == 2)] else { return };
-                let polarity = polarity(data & 0x100 == 0);
+                let row = self.rows[usize::from(code == 2)]?;
+                let (t_us, polarity) = (self.common.clock.t_us(), polarity(data & 0x100 == 0));
                 let mut mask = data & 0xff;
                 while mask != 0 {
-                    let y = row + mask.trailing_zeros() as u16;
-                    emit(Event { t_us: self.clock.t_us(), x: self.column, y, polarity });
+                    let (x, y) = (self.column, row + mask.trailing_zeros() as u16);
+                    let (x, y) = if self.swap_xy { (y, x) } else { (x, y) };
+                    emit(Event { t_us, x, y, polarity });
                     mask &= mask - 1;
                 }
             }
             4 => self.groups(data),
-            0 if data == 1 => self.clock.reset(),
-            7 => self.clock.wrap(data),
-            // Other special words, inertial samples.
-            0 | 5 | 6 => {}
-            _ => self.unknown += 1,
+            _ => return self.common.other(word),
         }
+        None
     }
 
-    /// Decodes words into `events`, until the words are used up, fewer than eight places are left, or the clock is set to zero.
-    /// Times are `offset_us` later than the camera's, and never earlier than `reached_us`, which they move on. With `swap_xy`, columns are
-    /// sent as rows.
+    /// Decodes words into `events`, until the words are used up, fewer than eight places are left, a gyro sample is complete, or
+    /// the clock is set to zero. Times are `offset_us` later than the camera's, and never earlier than `reached_us`, which they
+    /// move on.
     // Not inlined: what calls it is built for size.
     #[inline(never)]
     pub fn pack(
         &mut self,
         words: &[[u8; 2]],
-        swap_xy: bool,
         offset_us: u64,
         reached_us: &mut u64,
         events: &mut [PackedEvent],
     ) -> Packed {
         let room = events.len();
         let mut places = events.iter_mut();
-        let (mut used, mut reset) = (words.len(), false);
+        let (mut used, mut sample, mut reset) = (words.len(), None, false);
         let mut t_us = *reached_us;
         for (index, word) in words.iter().enumerate() {
             if places.len() < usize::from(GROUP_PX) {
@@ -87,21 +80,26 @@ impl Dvxplorer {
             if word == CLOCK_RESET {
                 reset = index == 0;
                 if reset {
-                    self.clock.reset();
+                    self.common.reset();
                 }
                 used = index.max(1);
                 break;
             }
-            self.decode(word, |event| {
+            sample = self.decode(word, |event| {
                 t_us = t_us.max(offset_us.wrapping_add(event.t_us));
                 if let Some(place) = places.next() {
-                    let (x, y) = if swap_xy { (event.y, event.x) } else { (event.x, event.y) };
-                    *place = PackedEvent::new(t_us as u32, x, y, event.polarity);
+                    *place = PackedEvent::new(t_us as u32, event.x, event.y, event.polarity);
                 }
             });
+            if let Some(sample) = &mut sample {
+                sample.t_us = offset_us.wrapping_add(sample.t_us);
+                t_us = t_us.max(sample.t_us);
+                used = index + 1;
+                break;
+            }
         }
         *reached_us = t_us;
-        Packed { words: used, events: room - places.len(), sample: None, reset }
+        Packed { words: used, events: room - places.len(), sample, reset }
     }
 
     /// A first group and a second one some groups above or below it.
@@ -114,22 +112,10 @@ impl Dvxplorer {
         self.rows = [row(first), second.and_then(row)];
     }
 
-    /// Times the wire's 15-bit clock wrapped (every 32.768 ms).
-    #[must_use]
-    pub const fn wraps(&self) -> u32 {
-        self.clock.wraps()
-    }
-
-    /// Times the camera set its clock to zero: time starts anew there.
-    #[must_use]
-    pub const fn resets(&self) -> u32 {
-        self.clock.resets()
-    }
-
     /// Words of a kind the camera does not send: many of them mean lost bytes.
     #[must_use]
     pub const fn unknown(&self) -> u64 {
-        self.unknown
+        self.common.unknown()
     }
 }
 
@@ -142,7 +128,7 @@ mod tests {
     use std::vec::Vec;
 
     fn decode(words: &[u16]) -> Vec<Event> {
-        let mut decoder = Dvxplorer::new();
+        let mut decoder = Dvxplorer::new(Mounting::default());
         let mut events = Vec::new();
         for &word in words {
             decoder.decode(word, |event| events.push(event));

@@ -1,7 +1,7 @@
 //! Prophesee EVT 2.0: one event in a 32-bit word.
 
 use super::high::HighClock;
-use super::polarity;
+use super::{Counts, polarity};
 use crate::event::{Event, PackedEvent};
 
 /// Bits above them tell what a word is.
@@ -66,22 +66,10 @@ impl Evt2 {
         }
     }
 
-    /// Times the wire's clock wrapped.
+    /// What the words told beside events.
     #[must_use]
-    pub const fn wraps(&self) -> u32 {
-        self.clock.wraps()
-    }
-
-    /// Events dropped because no time word had come yet.
-    #[must_use]
-    pub const fn untimed(&self) -> u64 {
-        self.untimed
-    }
-
-    /// Words of a type the format does not define: many of them mean that this is not EVT 2.0.
-    #[must_use]
-    pub const fn unknown(&self) -> u64 {
-        self.unknown
+    pub const fn counts(&self) -> Counts {
+        Counts { wraps: self.clock.wraps(), untimed: self.untimed, unknown: self.unknown }
     }
 }
 
@@ -154,7 +142,7 @@ mod tests {
                 Event { t_us: 3 * 64 + 6, x: 7, y: 2047, polarity: Polarity::Off },
             ]
         );
-        assert_eq!(decoder.untimed(), 1);
+        assert_eq!(decoder.counts().untimed, 1);
     }
 
     #[test]
@@ -163,7 +151,7 @@ mod tests {
         let (events, decoder) = decode(&[8 << 28 | last, cd(0, 63, 1, 1), 8 << 28, cd(0, 0, 1, 1)]);
         assert_eq!(events[0].t_us, (1 << 34) - 1);
         assert_eq!(events[1].t_us, 1 << 34);
-        assert_eq!(decoder.wraps(), 1);
+        assert_eq!(decoder.counts().wraps, 1);
     }
 
     #[test]
@@ -171,6 +159,6 @@ mod tests {
         let (events, decoder) =
             decode(&[8 << 28 | 100, cd(0, 0, 1, 1), 8 << 28 | 99, cd(0, 0, 1, 1)]);
         assert_eq!(events[1].t_us, 99 * 64);
-        assert_eq!(decoder.wraps(), 0);
+        assert_eq!(decoder.counts().wraps, 0);
     }
 }

@@ -1,7 +1,7 @@
 //! Prophesee EVT 2.1: 32 neighbouring pixels in a 64-bit word.
 
 use super::high::HighClock;
-use super::polarity;
+use super::{Counts, polarity};
 use crate::event::Event;
 
 /// Decoder of EVT 2.1 words (Prophesee, "EVT 2.1 format"). Sensors of the IMX636 generation send the upper half of a
@@ -47,23 +47,10 @@ impl Evt21 {
         }
     }
 
-    /// Times the wire's clock wrapped.
+    /// What the words told beside events.
     #[must_use]
-    pub const fn wraps(&self) -> u32 {
-        self.clock.wraps()
-    }
-
-    /// Events dropped because no time word had come yet.
-    #[must_use]
-    pub const fn untimed(&self) -> u64 {
-        self.untimed
-    }
-
-    /// Words of a type the format does not define: many of them mean that this is not EVT 2.1, or in the other byte
-    /// order.
-    #[must_use]
-    pub const fn unknown(&self) -> u64 {
-        self.unknown
+    pub const fn counts(&self) -> Counts {
+        Counts { wraps: self.clock.wraps(), untimed: self.untimed, unknown: self.unknown }
     }
 }
 
@@ -91,7 +78,7 @@ mod tests {
         let (events, decoder) = decode(&[word, time, word]);
         let at = |x| Event { t_us: 3 * 64 + 5, x, y: 9, polarity: Polarity::On };
         assert_eq!(events, [at(64), at(95)]);
-        assert_eq!(decoder.untimed(), 2);
+        assert_eq!(decoder.counts().untimed, 2);
     }
 
     #[test]

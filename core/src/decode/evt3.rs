@@ -1,6 +1,6 @@
 //! Prophesee EVT 3.0: 16-bit words that only say what changed.
 
-use super::polarity;
+use super::{Counts, polarity};
 use crate::event::{Event, PackedEvent, Polarity};
 
 /// Span of the 12-bit halves of the 24-bit clock, in their own units.
@@ -145,22 +145,10 @@ impl Evt3 {
         self.t_us = u64::from(self.wraps) << 24 | u64::from(high) << 12;
     }
 
-    /// Times the wire's 24-bit clock wrapped (every 16.777216 s).
+    /// What the words told beside events.
     #[must_use]
-    pub const fn wraps(&self) -> u32 {
-        self.wraps
-    }
-
-    /// Events dropped because no TIME_HIGH word had come yet.
-    #[must_use]
-    pub const fn untimed(&self) -> u64 {
-        self.untimed
-    }
-
-    /// Words of a type the format does not define: many of them mean that this is not EVT 3.0.
-    #[must_use]
-    pub const fn unknown(&self) -> u64 {
-        self.unknown
+    pub const fn counts(&self) -> Counts {
+        Counts { wraps: self.wraps, untimed: self.untimed, unknown: self.unknown }
     }
 }
 
@@ -196,7 +184,7 @@ mod tests {
                 Event { t_us: 0x1002, x: 4, y: 5, polarity: Polarity::Off },
             ]
         );
-        assert_eq!(decoder.untimed(), 1);
+        assert_eq!(decoder.counts().untimed, 1);
     }
 
     #[test]
@@ -211,7 +199,7 @@ mod tests {
     fn clock_wraps_after_2_to_the_24() {
         let words = [0x8fff, 0x6fff, PIXEL, 0x8000, 0x6000, PIXEL, 0x8001, 0x6001, PIXEL];
         assert_eq!(times(&words), [0xff_ffff, 0x100_0000, 0x100_1001]);
-        assert_eq!(decode(&words).1.wraps(), 1);
+        assert_eq!(decode(&words).1.counts().wraps, 1);
     }
 
     #[test]

@@ -283,6 +283,11 @@ impl Pose {
         self.sift(sums);
         if self.schedule.phase() == Phase::Last {
             self.slope = self.trend(sums);
+            if self.slope.is_none() && self.harmonic > self.first_harmonic {
+                // Too few blocks are in step.
+                self.step_back();
+                return false;
+            }
             let (x_px, y_px) = self.path.centre();
             self.disc.x_px += x_px;
             self.disc.y_px += y_px;

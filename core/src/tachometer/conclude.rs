@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use super::{BASE_WINDOW_US, Job, LONGEST_WINDOW_US, Tachometer, segment_us};
+use super::{BASE_WINDOW_US, Job, LONGEST_WINDOW_US, Stretch, Tachometer, segment_us};
 use crate::limits::MAX_ROTORS;
 use crate::order::sort_few;
 use crate::reading::{Evidence, Frame, Reading, Reason, RotorReading, Status};
@@ -77,10 +77,8 @@ impl Tachometer<'_> {
             self.until_search = self.until_search.min(SEARCH_AGAIN);
         }
         if self.overrun {
-            // There is a hole behind what is stored. What is known of the rotors still holds.
-            let until_search = self.until_search;
-            self.restart(self.last_us);
-            self.until_search = until_search;
+            // There is a hole behind what is stored.
+            self.begin_anew(self.last_us);
             return;
         }
         let torn = self.store.is_torn();
@@ -95,7 +93,13 @@ impl Tachometer<'_> {
         let adapts = self.settings.window_us.is_none();
         // Six whole segments may fall short of the longest window by some microseconds.
         let longest = self.store.segment_us() >= segment_us(LONGEST_WINDOW_US);
-        if adapts && wanted > window_us as f32 * 1.02 && !longest {
+        let too_long = adapts && !torn && self.is_too_long(status, longest);
+        if too_long {
+            // As late as measuring it may end without anything given up, so that nothing depends on when it did.
+            let last = (WINDOW_SEGMENTS + self.store.spare()) as u64;
+            let end_us = self.store.start_us() + last * u64::from(self.store.segment_us());
+            self.anew_us = Some(end_us);
+        } else if adapts && wanted > window_us as f32 * 1.02 && !longest {
             let longer = WINDOWS_US.iter().find(|w| **w as f32 >= wanted);
             self.target_us = longer.copied().unwrap_or(LONGEST_WINDOW_US);
             self.store.lengthen(segment_us(self.target_us));
@@ -109,6 +113,28 @@ impl Tachometer<'_> {
             self.fade(hop);
         }
         self.begin();
+    }
+
+    /// Whether a window that grew before a still scene is to begin short again, because all that turns now does with less; and
+    /// keeps what speaks for that.
+    fn is_too_long(&mut self, status: Status, longest: bool) -> bool {
+        match status {
+            Status::Locked if !longest => self.stretch = Stretch::Wanted,
+            Status::Locked if self.stretch == Stretch::Blind => {
+                let does_with_less = |o: &Outcome| {
+                    o.status == Status::Locked && o.wanted_us <= BASE_WINDOW_US as f32
+                };
+                if self.outcomes.iter().all(does_with_less) {
+                    self.stretch = Stretch::Tried;
+                    return true;
+                }
+            }
+            Status::Refused(_) if longest && self.stretch == Stretch::Wanted => {
+                self.stretch = Stretch::Blind;
+            }
+            _ => {}
+        }
+        false
     }
 
     fn fade(&mut self, segments: usize) {

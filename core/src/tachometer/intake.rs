@@ -143,12 +143,20 @@ impl Tachometer<'_> {
     pub(super) fn restart(&mut self, t_us: u64) {
         self.started = true;
         self.overrun = false;
+        self.anew_us = None;
         self.window_segments = 0;
         self.job = Job::Idle;
         self.target_us = self.settings.window_us.unwrap_or(BASE_WINDOW_US);
         self.store.restart(t_us, segment_us(FIRST_WINDOW_US.min(self.target_us)));
         self.heat.clear();
         self.until_search = 0;
+    }
+
+    /// Forgets the window, but not when the whole image is to be searched: what is known of the rotors still holds.
+    pub(super) fn begin_anew(&mut self, t_us: u64) {
+        let until_search = self.until_search;
+        self.restart(t_us);
+        self.until_search = until_search;
     }
 
     /// Closes segments until the open one holds `t_us`.
@@ -162,6 +170,10 @@ impl Tachometer<'_> {
             return;
         }
         while t_us >= self.store.open_end_us() {
+            if self.anew_us.is_some_and(|at_us| at_us <= self.store.open_end_us()) {
+                self.begin_anew(t_us);
+                return;
+            }
             if self.store.full() {
                 if !goes_on {
                     self.overrun = true;
@@ -177,7 +189,8 @@ impl Tachometer<'_> {
 
     /// Begins to measure the window once it is full, or makes it longer first.
     pub(super) fn begin(&mut self) {
-        while self.window_segments == 0 && self.store.closed() >= WINDOW_SEGMENTS {
+        let waits = self.anew_us.is_some();
+        while !waits && self.window_segments == 0 && self.store.closed() >= WINDOW_SEGMENTS {
             let window_us = self.store.segment_us() * WINDOW_SEGMENTS as u32;
             if window_us + WINDOW_SEGMENTS as u32 <= self.target_us {
                 self.store.lengthen(segment_us(self.target_us.min(2 * window_us)));

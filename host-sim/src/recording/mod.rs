@@ -20,6 +20,7 @@ mod ros2;
 mod spi;
 pub mod write;
 
+use evtach_core::decode::Counts;
 use evtach_core::{Event, Geometry};
 
 pub use error::{Place, RecordingError};
@@ -75,6 +76,14 @@ pub struct Side {
     pub imu: Vec<ImuSample>,
     /// What a person should know, one sentence each: cut files, skipped streams.
     pub notes: Vec<String>,
+}
+
+impl Side {
+    /// Takes over what Prophesee's words told since the start.
+    fn note(&mut self, counts: Counts) {
+        self.wraps = counts.wraps.into();
+        self.untimed = counts.untimed;
+    }
 }
 
 /// An open recording.

@@ -1,9 +1,9 @@
 //! What a camera at the port sees, read by the device: the PC's readings to the bit, and the PC's screen to the pixel.
 
-use evtach_core::decode::Dvxplorer;
-use evtach_core::{Event, GyroSample, Reading, Settings};
+use evtach_core::decode::{Davis, Dvxplorer, Mounting};
+use evtach_core::{Event, Frame, GyroSample, Reading, Settings};
 use evtach_firmware::instrument::{Instrument, Picture, Preferences, Sensor, Traffic};
-use evtach_firmware::sensor::usb::emulated::DvxplorerWords;
+use evtach_firmware::sensor::usb::emulated::{DavisWords, DvxplorerWords, GyroRange};
 use evtach_host::measure::{Capacity, ReadingRow, drain, measure_events, with_tachometer};
 use evtach_host::synth::{Rotor, Scene};
 use evtach_tests::{Loaded, load, recordings, show};
@@ -42,27 +42,45 @@ fn as_sent(camera: Camera, sees: &Loaded) -> Loaded {
         words.event(event, &mut said);
     }
     words.flush(&mut said);
-    let mut decoder = Dvxplorer::new();
+    let mut decoder = Dvxplorer::new(Mounting::default());
     for word in said {
         decoder.decode(word, |event| events.push(event));
     }
     Loaded { events, geometry: sees.geometry }
 }
 
-/// What a camera's gyro says that feels nothing, a thousand times a second; the DAVIS346's alone is listened to.
-fn still(camera: Camera, lasts_us: u64) -> Vec<GyroSample> {
-    let samples = (0..=lasts_us).step_by(1000);
-    let samples = samples.map(|t_us| GyroSample { t_us, roll_rad_s: -0.0 });
-    if camera == Camera::Davis346 { samples.collect() } else { Vec::new() }
+/// What the gyro of a camera says that rolls so fast all the while, to the steps that it counts in.
+fn rolling(camera: Camera, roll_rad_s: f32, lasts_us: u64) -> Vec<GyroSample> {
+    let said = GyroSample { t_us: 0, roll_rad_s };
+    let (mut words, mounting) = (Vec::new(), Mounting::default());
+    let (every_us, heard) = match camera {
+        Camera::Davis346 => {
+            DavisWords::default().gyro(&said, GyroRange::davis346(1), &mut words);
+            let mut decoder = Davis::new(mounting);
+            (1_000, words.iter().find_map(|word| decoder.decode(*word, |_| {})))
+        }
+        Camera::Dvxplorer => {
+            DvxplorerWords::default().gyro(&said, GyroRange::dvxplorer(2), &mut words);
+            let mut decoder = Dvxplorer::new(mounting);
+            (1_250, words.iter().find_map(|word| decoder.decode(*word, |_| {})))
+        }
+    };
+    let roll_rad_s = heard.expect("a sample").roll_rad_s;
+    (0..=lasts_us).step_by(every_us).map(|t_us| GyroSample { t_us, roll_rad_s }).collect()
 }
 
 impl Twin {
     /// Sees what the camera sends of this, measures it, and hears nothing more for so long.
-    fn new(camera: Camera, sees: &Loaded, window_us: Option<u32>, silent_us: u64) -> Self {
+    fn new(
+        (camera, roll_rad_s): (Camera, f32),
+        sees: &Loaded,
+        window_us: Option<u32>,
+        silent_us: u64,
+    ) -> Self {
         let sent = as_sent(camera, sees);
         let settings = Settings { window_us, ..Settings::new(sent.geometry) };
         let lasts_us = sent.events.last().map_or(0, |event| event.t_us);
-        let gyro = still(camera, lasts_us);
+        let gyro = rolling(camera, roll_rad_s, lasts_us);
         let mut instrument = Instrument::new(Preferences::default());
         instrument.set_sensor(Sensor::Present);
         let traffic = Traffic { events: sent.events.len() as u64, lost: 0 };
@@ -98,18 +116,29 @@ impl Twin {
 /// the fewest digits that give it again), and its panel shows what the PC draws, to the last pixel.
 fn assert_reads_and_shows_as_the_pc(
     camera: Camera,
-    mut sees: Loaded,
+    sees: Loaded,
     window_ms: Option<u32>,
     wanted: Option<(usize, &str)>,
 ) {
-    let Some(mut board) = Board::switch_on() else { return };
+    read_and_shown(camera, 0.0, sees, window_ms, wanted);
+}
+
+/// The same from a camera that rolls so fast all the while; returns the reading, where there is a board.
+fn read_and_shown(
+    camera: Camera,
+    roll_rad_s: f32,
+    mut sees: Loaded,
+    window_ms: Option<u32>,
+    wanted: Option<(usize, &str)>,
+) -> Option<Reading> {
+    let mut board = Board::switch_on()?;
     let window_us = window_ms.map(|ms| ms * 1000);
     let until_us = window_us.map_or(WINDOW_US, u64::from) + BEHIND_US;
     assert!(sees.events.last().is_some_and(|last| last.t_us >= until_us - BEHIND_US), "too short");
     sees.events.retain(|event| event.t_us < until_us);
     // For longer than a rate is told over; a refusal of what ended so early gives way to the silence before it is drawn.
     let silent_us = if wanted.is_some() { 300_000 } else { 1_500_000 };
-    let twin = Twin::new(camera, &sees, window_us, silent_us);
+    let twin = Twin::new((camera, roll_rad_s), &sees, window_us, silent_us);
     let [reading] = &twin.readings[..] else { unreachable!("{:#?}", twin.readings) };
     let found = (reading.rotors.len(), reading.status.as_str());
     assert_eq!(wanted.unwrap_or(found), found, "{reading:?}");
@@ -119,6 +148,7 @@ fn assert_reads_and_shows_as_the_pc(
         board.query(&format!("WIND {ms} MS;WIND?"));
     }
     board.serial("SYST:LOG ON");
+    board.break_(&format!("roll {roll_rad_s}"));
     board.plug_camera(camera, &sees);
     let shown = drawn(&twin.instrument);
     let (mut said, mut wrong, mut took_s) = (String::new(), usize::MAX, 0.0);
@@ -158,6 +188,38 @@ fn assert_reads_and_shows_as_the_pc(
         "pixels that differ from the PC's, see device.png and pc.png in the folder for what is temporary"
     );
     board.assert_sound();
+    Some(reading.clone())
+}
+
+#[test]
+fn a_camera_that_rolls_tells_the_speed_in_the_room() {
+    const ROLL_RAD_S: f32 = 0.3;
+    const RPM: f64 = 600.0;
+    for (camera, geometry) in [(Camera::Davis346, DAVIS346), (Camera::Dvxplorer, DVXPLORER)] {
+        let (x_px, y_px) =
+            (f64::from(geometry.width_px) / 2.0, f64::from(geometry.height_px) / 2.0);
+        let rotor = Rotor { rpm: RPM, radius_px: 22.0, blades: 3, x_px, y_px, ..Rotor::default() };
+        let mut scene = Scene {
+            width_px: geometry.width_px,
+            height_px: geometry.height_px,
+            rotors: vec![rotor],
+            duration_ms: 510.0,
+            ..Scene::default()
+        };
+        scene.sensor.noise_hz = 0.05;
+        scene.camera.roll_rad_s = ROLL_RAD_S.into();
+        // The hand that rolls it moves it as well, so that the gyro is the better witness.
+        scene.camera.drift_px_s = [30.0, -10.0];
+        let sees = synthesise(&scene);
+        let wanted = Some((1, "locked"));
+        let Some(reading) = read_and_shown(camera, ROLL_RAD_S, sees, Some(500), wanted) else {
+            return;
+        };
+        let speed = reading.rotors.first().and_then(|rotor| rotor.speed).expect("a speed");
+        assert_eq!(speed.frame, Frame::Room, "{camera:?}");
+        // The roll is 2.9 rpm.
+        assert!((f64::from(speed.rpm()) - RPM).abs() < 0.3, "{camera:?}: {reading:?}");
+    }
 }
 
 #[test]

@@ -7,7 +7,7 @@ use super::super::path::Path;
 use crate::limits::MAX_KNOTS;
 
 /// Fewest events in a block that counts.
-const LEAST_IN_BLOCK: f32 = 16.0;
+const LEAST_IN_BLOCK: f32 = 8.0;
 /// Share of a block's events in step, over that of all, below which the block is not believed, and the least.
 pub const BLOCK_SHARE: f32 = 0.4;
 pub const LEAST_SHARE: f32 = 0.05;

@@ -71,80 +71,54 @@ impl Frames {
         ptr::from_ref(&*self.front).addr()
     }
 
-    /// The rows that something is to be drawn on, with all that was drawn before.
-    fn rows(&mut self, rows: Range<usize>) -> &mut [Row] {
+    /// Makes the frame to be drawn on like the one that is shown.
+    fn catch_up(&mut self) {
         if !self.stale.is_empty() {
             // Drawn four times a second, so that the display has long changed frames; one that hangs shows nothing anyway.
             (0..LOOKS).any(|_| display::shown());
             let stale = core::mem::take(&mut self.stale);
             self.back[stale.clone()].copy_from_slice(&self.front[stale]);
         }
+    }
+
+    /// Notes that these rows were drawn on.
+    fn drew(&mut self, rows: Range<usize>) {
         if !rows.is_empty() {
             let drawn = &self.drawn;
             self.drawn = if drawn.is_empty() {
-                rows.clone()
+                rows
             } else {
                 drawn.start.min(rows.start)..drawn.end.max(rows.end)
             };
         }
-        &mut self.back[rows]
     }
 }
 
-impl OriginDimensions for Frames {
-    fn size(&self) -> Size {
-        Size::new(WIDTH as u32, HEIGHT as u32)
+impl Panel {
+    /// To be called before pixels are set.
+    fn begin(&mut self) {
+        if let Self::Frames(frames) = self {
+            frames.catch_up();
+        }
     }
-}
 
-impl DrawTarget for Frames {
-    type Color = Rgb565;
-    type Error = Infallible;
-
-    fn draw_iter<I>(&mut self, pixels: I) -> Result<(), Infallible>
-    where
-        I: IntoIterator<Item = Pixel<Rgb565>>,
-    {
-        self.rows(0..0);
-        let (mut first, mut end) = (HEIGHT, 0);
-        for Pixel(Point { x, y }, colour) in pixels {
-            let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { continue };
-            if let Some(pixel) = self.back.get_mut(y).and_then(|row| row.get_mut(x)) {
-                *pixel = colour.into_storage().to_le_bytes();
-                (first, end) = (first.min(y), end.max(y + 1));
+    /// Sets a pixel; whether it is on the screen.
+    #[inline]
+    fn set(&mut self, x: usize, y: usize, colour: Rgb565) -> bool {
+        match self {
+            Self::Frames(Frames { back, .. }) => {
+                let pixel = back.get_mut(y).and_then(|row| row.get_mut(x));
+                pixel.map(|pixel| *pixel = colour.into_storage().to_le_bytes()).is_some()
             }
+            Self::Spare(spare) => spare.set(x, y, colour),
         }
-        if first < end {
-            self.rows(first..end);
-        }
-        Ok(())
     }
 
-    fn fill_contiguous<I>(&mut self, area: &Rectangle, colours: I) -> Result<(), Infallible>
-    where
-        I: IntoIterator<Item = Rgb565>,
-    {
-        if area.intersection(&self.bounding_box()) != *area {
-            return self.draw_iter(area.points().zip(colours).map(|(at, c)| Pixel(at, c)));
+    /// To be called when pixels in these rows were set.
+    fn end(&mut self, rows: Range<usize>) {
+        if let Self::Frames(frames) = self {
+            frames.drew(rows);
         }
-        let (left, top) = (area.top_left.x as usize, area.top_left.y as usize);
-        let mut colours = colours.into_iter();
-        for row in self.rows(top..top + area.size.height as usize) {
-            for pixel in &mut row[left..left + area.size.width as usize] {
-                let Some(colour) = colours.next() else { return Ok(()) };
-                *pixel = colour.into_storage().to_le_bytes();
-            }
-        }
-        Ok(())
-    }
-
-    fn fill_solid(&mut self, area: &Rectangle, colour: Rgb565) -> Result<(), Infallible> {
-        let Rectangle { top_left, size } = area.intersection(&self.bounding_box());
-        let (left, top) = (top_left.x as usize, top_left.y as usize);
-        for row in self.rows(top..top + size.height as usize) {
-            row[left..left + size.width as usize].fill(colour.into_storage().to_le_bytes());
-        }
-        Ok(())
     }
 }
 
@@ -162,28 +136,58 @@ impl DrawTarget for Panel {
     where
         I: IntoIterator<Item = Pixel<Rgb565>>,
     {
-        match self {
-            Self::Frames(frames) => frames.draw_iter(pixels),
-            Self::Spare(spare) => spare.draw_iter(pixels),
+        self.begin();
+        let (mut first, mut end) = (HEIGHT, 0);
+        for Pixel(Point { x, y }, colour) in pixels {
+            let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { continue };
+            if self.set(x, y, colour) {
+                (first, end) = (first.min(y), end.max(y + 1));
+            }
         }
+        self.end(first..end);
+        Ok(())
     }
 
     fn fill_contiguous<I>(&mut self, area: &Rectangle, colours: I) -> Result<(), Infallible>
     where
         I: IntoIterator<Item = Rgb565>,
     {
-        match self {
-            Self::Frames(frames) => frames.fill_contiguous(area, colours),
-            Self::Spare(spare) => spare.fill_contiguous(area, colours),
+        if area.intersection(&self.bounding_box()) != *area {
+            return self.draw_iter(area.points().zip(colours).map(|(at, c)| Pixel(at, c)));
         }
+        self.begin();
+        let (columns, rows) = spans(area);
+        let mut colours = colours.into_iter();
+        'all: for y in rows.clone() {
+            for x in columns.clone() {
+                let Some(colour) = colours.next() else { break 'all };
+                self.set(x, y, colour);
+            }
+        }
+        self.end(rows);
+        Ok(())
     }
 
     fn fill_solid(&mut self, area: &Rectangle, colour: Rgb565) -> Result<(), Infallible> {
-        match self {
-            Self::Frames(frames) => frames.fill_solid(area, colour),
-            Self::Spare(spare) => spare.fill_solid(area, colour),
+        self.begin();
+        let (columns, rows) = spans(&area.intersection(&self.bounding_box()));
+        for y in rows.clone() {
+            match self {
+                Self::Frames(frames) => {
+                    frames.back[y][columns.clone()].fill(colour.into_storage().to_le_bytes());
+                }
+                Self::Spare(spare) => spare.fill(y, columns.clone(), colour),
+            }
         }
+        self.end(rows);
+        Ok(())
     }
+}
+
+/// Columns and rows of an area on the screen.
+fn spans(area: &Rectangle) -> (Range<usize>, Range<usize>) {
+    let (left, top) = (area.top_left.x as usize, area.top_left.y as usize);
+    (left..left + area.size.width as usize, top..top + area.size.height as usize)
 }
 
 impl tasks::Panel for Panel {

@@ -1,8 +1,8 @@
 //! A screen without SDRAM: eight bits a pixel, in the memory of the events, which are not measured then.
 #![expect(unsafe_code, reason = "memory as bytes that is handed out once")]
 
-use core::convert::Infallible;
 use core::mem::MaybeUninit;
+use core::ops::Range;
 
 use embassy_stm32::ltdc;
 use embedded_graphics::pixelcolor::Rgb565;
@@ -45,29 +45,24 @@ impl Spare {
     pub fn address(&self) -> usize {
         self.0.as_ptr().expose_provenance()
     }
-}
 
-impl OriginDimensions for Spare {
-    fn size(&self) -> Size {
-        Size::new(WIDTH as u32, HEIGHT as u32)
-    }
-}
-
-impl DrawTarget for Spare {
-    type Color = Rgb565;
-    type Error = Infallible;
-
-    fn draw_iter<I>(&mut self, pixels: I) -> Result<(), Infallible>
-    where
-        I: IntoIterator<Item = Pixel<Rgb565>>,
-    {
-        for Pixel(Point { x, y }, colour) in pixels {
-            let (Ok(x), Ok(y)) = (usize::try_from(x), usize::try_from(y)) else { continue };
-            if x < WIDTH && y < HEIGHT {
-                let code = colour.r() >> 2 << 5 | colour.g() >> 3 << 2 | colour.b() >> 3;
-                self.0[y * WIDTH + x] = code;
-            }
+    /// Sets a pixel; whether it is on the screen.
+    pub fn set(&mut self, x: usize, y: usize, colour: Rgb565) -> bool {
+        let on_screen = x < WIDTH && y < HEIGHT;
+        if on_screen {
+            self.0[y * WIDTH + x] = code(colour);
         }
-        Ok(())
+        on_screen
     }
+
+    /// Sets the pixels of a row in these columns, which are on the screen.
+    pub fn fill(&mut self, y: usize, columns: Range<usize>, colour: Rgb565) {
+        let row = y * WIDTH;
+        self.0[row + columns.start..row + columns.end].fill(code(colour));
+    }
+}
+
+/// What stands for a colour.
+fn code(colour: Rgb565) -> u8 {
+    colour.r() >> 2 << 5 | colour.g() >> 3 << 2 | colour.b() >> 3
 }

@@ -12,7 +12,7 @@ use super::trouble::Trouble;
 pub enum Model {
     /// iniVation DAVIS346: 346x260 pixels, with a gyro.
     Davis346,
-    /// iniVation DVXplorer: 640x480 pixels. Its gyro is left off: its samples are not decoded.
+    /// iniVation DVXplorer: 640x480 pixels, with a gyro.
     Dvxplorer,
 }
 

@@ -142,7 +142,7 @@ const DVXPLORER_MHZ: u32 = 50;
 /// The chip's own run register: 0 off, 2 streaming.
 const DVXPLORER_MODE: u16 = 0x3000;
 
-/// DVXplorer: events only.
+/// DVXplorer: events and the gyro.
 pub(super) const DVXPLORER: &[Step] = &[
     STOP[0],
     Step::Write(Chip, &[(DVXPLORER_MODE, 0)]),
@@ -187,5 +187,7 @@ pub(super) const DVXPLORER: &[Step] = &[
     Step::Write(Mux, &[(1, 1), (0, 1)]),
     Step::WaitMs(10),
     Step::Write(Dvs, &[(3, 1)]),
+    // 800 samples a second, its own filter at normal width, 500 degrees per second at most; only the gyro.
+    Step::Write(Imu, &[(8, 5), (9, 2), (10, 2), (3, 1)]),
     Step::Write(Chip, &[(DVXPLORER_MODE, 2)]),
 ];

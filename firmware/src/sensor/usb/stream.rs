@@ -26,7 +26,7 @@ pub(super) struct Stream {
 #[derive(Clone, Debug)]
 enum Decoder {
     Davis(Davis),
-    Dvxplorer { words: Dvxplorer, swap_xy: bool },
+    Dvxplorer(Dvxplorer),
 }
 
 impl Stream {
@@ -35,9 +35,7 @@ impl Stream {
     pub const fn new(model: Model, mounting: Mounting, before_us: Option<u64>) -> Self {
         let decoder = match model {
             Model::Davis346 => Decoder::Davis(Davis::new(mounting)),
-            Model::Dvxplorer => {
-                Decoder::Dvxplorer { words: Dvxplorer::new(), swap_xy: mounting.swap_xy }
-            }
+            Model::Dvxplorer => Decoder::Dvxplorer(Dvxplorer::new(mounting)),
         };
         let offset_us = match before_us {
             Some(us) => us.saturating_add(GAP_US),
@@ -55,7 +53,7 @@ impl Stream {
     pub const fn unknown(&self) -> u64 {
         match &self.decoder {
             Decoder::Davis(words) => words.unknown(),
-            Decoder::Dvxplorer { words, .. } => words.unknown(),
+            Decoder::Dvxplorer(words) => words.unknown(),
         }
     }
 
@@ -71,9 +69,7 @@ impl Stream {
         let (offset_us, reached_us) = (self.offset_us, &mut self.reached_us);
         match &mut self.decoder {
             Decoder::Davis(decoder) => decoder.pack(words, offset_us, reached_us, events),
-            Decoder::Dvxplorer { words: decoder, swap_xy } => {
-                decoder.pack(words, *swap_xy, offset_us, reached_us, events)
-            }
+            Decoder::Dvxplorer(decoder) => decoder.pack(words, offset_us, reached_us, events),
         }
     }
 

@@ -79,8 +79,7 @@ impl Decoder for Evt2 {
     }
 
     fn report(&self, side: &mut Side) {
-        side.wraps = u64::from(self.wraps());
-        side.untimed = self.untimed();
+        side.note(self.counts());
     }
 }
 
@@ -98,8 +97,7 @@ impl Decoder for Evt3 {
     }
 
     fn report(&self, side: &mut Side) {
-        side.wraps = u64::from(self.wraps());
-        side.untimed = self.untimed();
+        side.note(self.counts());
     }
 }
 
@@ -125,8 +123,7 @@ impl Decoder for Evt21Bytes {
     }
 
     fn report(&self, side: &mut Side) {
-        side.wraps = u64::from(self.decoder.wraps());
-        side.untimed = self.decoder.untimed();
+        side.note(self.decoder.counts());
     }
 }
 

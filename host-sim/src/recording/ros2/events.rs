@@ -75,22 +75,19 @@ impl PacketDecoder {
                 for word in bytes.as_chunks().0 {
                     decoder.decode(u32::from_le_bytes(*word), |event| events.push(event));
                 }
-                side.wraps = u64::from(decoder.wraps());
-                side.untimed = decoder.untimed();
+                side.note(decoder.counts());
             }
             Self::Evt21(decoder) => {
                 for word in bytes.as_chunks().0 {
                     decoder.decode(u64::from_le_bytes(*word), |event| events.push(event));
                 }
-                side.wraps = u64::from(decoder.wraps());
-                side.untimed = decoder.untimed();
+                side.note(decoder.counts());
             }
             Self::Evt3(decoder) => {
                 for word in bytes.as_chunks().0 {
                     decoder.decode(u16::from_le_bytes(*word), |event| events.push(event));
                 }
-                side.wraps = u64::from(decoder.wraps());
-                side.untimed = decoder.untimed();
+                side.note(decoder.counts());
             }
             Self::Libcaer => libcaer(bytes, packet.time_base_ns, events, side),
             Self::LibcaerCompressed => libcaer_compressed(bytes, packet.time_base_ns, events),

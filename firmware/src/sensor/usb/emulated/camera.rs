@@ -5,16 +5,13 @@ use std::vec::Vec;
 
 use evtach_core::{Event, GyroSample, Roi};
 
-use super::words::{DavisWords, DvxplorerWords};
+use super::words::{DavisWords, DvxplorerWords, GyroRange};
 use crate::sensor::usb::{Model, Module, Register, Transfer};
 
 /// Bytes of the camera's FIFO: four buffers of the FX3's DMA.
 const FIFO_BYTES: usize = 32 * 1024;
 /// Payload of a high-speed bulk packet.
 const PACKET_BYTES: usize = 512;
-/// Time between two samples of the gyro in microseconds.
-const GYRO_US: u64 = 1_000;
-
 /// How the pixels lie.
 const ORIENTATION: Register = Register::new(Module::Dvs, 2);
 
@@ -311,11 +308,23 @@ impl Camera {
         }
     }
 
+    /// Time between two samples of the gyro in microseconds, and its range.
+    fn gyro(&self) -> (u64, GyroRange) {
+        let of = |parameter| self.get(Register::new(Module::Imu, parameter));
+        match self.model {
+            // A thousand samples a second, by a divider that counts from zero.
+            Model::Davis346 => ((1 + u64::from(of(5))) * 1_000, GyroRange::davis346(of(10))),
+            // 25 samples a second, and twice as many with each number.
+            Model::Dvxplorer => (40_000 >> of(8).min(7), GyroRange::dvxplorer(of(10))),
+        }
+    }
+
     /// Lets the world's time pass: what happens until then comes into the FIFO, or is lost there.
     pub fn run_until(&mut self, now_us: u64) {
         self.now_us = self.now_us.max(now_us);
         let filters = self.filters();
-        let gyro = self.model == Model::Davis346 && self.get(Register::new(Module::Imu, 3)) != 0;
+        let gyro = [0, 3].iter().all(|&at| self.get(Register::new(Module::Imu, at)) != 0);
+        let (gyro_us, range) = self.gyro();
         while let Some(started_us) = self.started_us {
             let clock_us = self.now_us.saturating_sub(started_us);
             let event = self
@@ -324,11 +333,10 @@ impl Camera {
             let event_us = event.map_or(u64::MAX, |event| event.t_us);
             if gyro && self.next_gyro_us <= event_us.min(clock_us) {
                 let sample = GyroSample { t_us: self.next_gyro_us, roll_rad_s: self.roll_rad_s };
-                self.next_gyro_us += GYRO_US;
-                self.send(started_us + sample.t_us, |words, out| {
-                    if let Words::Davis(words) = words {
-                        words.gyro(&sample, out);
-                    }
+                self.next_gyro_us += gyro_us;
+                self.send(started_us + sample.t_us, |words, out| match words {
+                    Words::Davis(words) => words.gyro(&sample, range, out),
+                    Words::Dvxplorer(words) => words.gyro(&sample, range, out),
                 });
             } else if let Some(event) = event.filter(|_| event_us <= clock_us) {
                 if let Some((_, fault)) = self.planned.pop_front_if(|(at, _)| *at <= self.at) {

@@ -18,7 +18,7 @@ use crate::sensor::outlet::{Filled, Words as _};
 
 pub use camera::{Camera, Fault, Filters, Packet, Stalled};
 pub use port::{Act, Device, Pipe, Port, World};
-pub use words::{DavisWords, DvxplorerWords};
+pub use words::{DavisWords, DvxplorerWords, GyroRange};
 
 /// What the device makes of transfers, and how much of them it took for damage: words, and halves of words.
 #[must_use]

@@ -15,9 +15,44 @@ const MOST_GROUPS_APART: u16 = 0x1f;
 const TIMESTAMP_RESET: u16 = 1;
 const IMU_START: u16 = 5;
 const IMU_END: u16 = 7;
-/// Only the rate comes, at 500 degrees per second over 2^15 steps.
-const IMU_FORMAT: u16 = 0x5300 | 2 << 5 | 1;
-const STEPS_PER_RAD_S: f32 = 32768.0 / (500.0 * core::f32::consts::PI / 180.0);
+/// What follows, of which only the rate; the number of its range comes in the lowest bits.
+const IMU_RATE: u16 = 0x5300 | 2 << 5;
+
+/// Range of a camera's gyro, as its register for that says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GyroRange {
+    /// Its number.
+    pub number: u16,
+    /// Degrees per second over 2^15 steps.
+    pub degrees_s: u16,
+}
+
+impl GyroRange {
+    /// Of a DAVIS346 (InvenSense), by the two bits of the register.
+    #[must_use]
+    pub const fn davis346(register: u32) -> Self {
+        let number = register as u16 & 3;
+        Self { number, degrees_s: 250 << number }
+    }
+
+    /// Of a DVXplorer (Bosch), by the three bits of the register.
+    #[must_use]
+    pub const fn dvxplorer(register: u32) -> Self {
+        let number = register as u16 & 7;
+        Self { number, degrees_s: 2000 >> number }
+    }
+}
+
+/// Adds the words of a gyro sample, to the nearest step of the range.
+fn gyro(clock: &mut Clock, sample: &GyroSample, range: GyroRange, out: &mut Vec<u16>) {
+    clock.at(sample.t_us, out);
+    // The decoder turns the sign: what turns the camera clockwise turns the picture back.
+    let z = (-sample.roll_rad_s.to_degrees() * 32768.0 / f32::from(range.degrees_s)).round() as i16;
+    out.extend([IMU_START, IMU_RATE | range.number]);
+    let [high, low] = z.to_be_bytes();
+    out.extend([0, 0, 0, 0, high, low].map(|byte| 0x5000 | u16::from(byte)));
+    out.push(IMU_END);
+}
 
 /// The 15-bit clock of the words.
 #[derive(Clone, Debug, Default)]
@@ -79,15 +114,9 @@ impl DavisWords {
         out.push(code | column & 0xfff);
     }
 
-    /// Adds the words of a gyro sample, to the nearest 1/65 of a degree per second.
-    pub fn gyro(&mut self, sample: &GyroSample, out: &mut Vec<u16>) {
-        self.clock.at(sample.t_us, out);
-        // The decoder turns the sign: what turns the camera clockwise turns the picture back.
-        let z = (-sample.roll_rad_s * STEPS_PER_RAD_S).round() as i16;
-        out.extend([IMU_START, IMU_FORMAT]);
-        let [high, low] = z.to_be_bytes();
-        out.extend([0, 0, 0, 0, high, low].map(|byte| 0x5000 | u16::from(byte)));
-        out.push(IMU_END);
+    /// Adds the words of a gyro sample, to the nearest step of the range.
+    pub fn gyro(&mut self, sample: &GyroSample, range: GyroRange, out: &mut Vec<u16>) {
+        gyro(&mut self.clock, sample, range, out);
     }
 
     /// The clock is set to zero.
@@ -150,6 +179,12 @@ impl DvxplorerWords {
         let code = self.group(pixels.group, out);
         let darker = if pixels.polarity == Polarity::Off { 0x100 } else { 0 };
         out.push(code | darker | pixels.mask);
+    }
+
+    /// Adds what was kept, and the words of a gyro sample, to the nearest step of the range.
+    pub fn gyro(&mut self, sample: &GyroSample, range: GyroRange, out: &mut Vec<u16>) {
+        self.flush(out);
+        gyro(&mut self.clock, sample, range, out);
     }
 
     /// The code of masks for a group, which becomes the first of the two unless it is one of them.
@@ -218,7 +253,7 @@ mod tests {
             let mut encoder = DvxplorerWords::default();
             events.iter().for_each(|event| encoder.event(event, &mut words));
             encoder.flush(&mut words);
-            let mut decoder = Dvxplorer::new();
+            let mut decoder = Dvxplorer::new(Mounting::default());
             let mut decoded = Vec::new();
             for word in words {
                 decoder.decode(word, |event| decoded.push(event));
@@ -231,13 +266,21 @@ mod tests {
     #[test]
     fn gyro_samples_come_back_with_their_sign() {
         let sample = GyroSample { t_us: 70_000, roll_rad_s: -1.25 };
-        let mut words = Vec::new();
-        DavisWords::default().gyro(&sample, &mut words);
+        let mut words = [Vec::new(), Vec::new()];
+        for number in 0..4 {
+            let [davis, dvxplorer] = &mut words;
+            DavisWords::default().gyro(&sample, GyroRange::davis346(number), davis);
+            DvxplorerWords::default().gyro(&sample, GyroRange::dvxplorer(number), dvxplorer);
+        }
+        let [davis, dvxplorer] = words;
         let mut decoder = Davis::new(Mounting::default());
-        let samples: Vec<_> =
-            words.iter().filter_map(|&word| decoder.decode(word, |_| {})).collect();
-        assert_eq!(samples.len(), 1);
-        assert_eq!(samples[0].t_us, sample.t_us);
-        assert!((samples[0].roll_rad_s - sample.roll_rad_s).abs() < 2e-4);
+        let mut samples: Vec<_> =
+            davis.iter().filter_map(|&word| decoder.decode(word, |_| {})).collect();
+        let mut decoder = Dvxplorer::new(Mounting::default());
+        samples.extend(dvxplorer.iter().filter_map(|&word| decoder.decode(word, |_| {})));
+        assert_eq!(samples.len(), 8);
+        for found in samples {
+            assert!((found.roll_rad_s - sample.roll_rad_s).abs() < 6e-4, "{found:?}");
+        }
     }
 }

@@ -169,6 +169,8 @@ fn a_dvxplorer_is_started_in_the_documented_order() {
         writes(Usb, &[(1, 80_000), (0, 1)]),
         writes(Mux, &[(1, 1), (0, 1)]),
         writes(Dvs, &[(3, 1)]),
+        // Gyro: 800 Hz, normal filter, 500 deg/s.
+        writes(Imu, &[(8, 5), (9, 2), (10, 2), (3, 1)]),
         chip(&[(0x3000, 2)]),
     ];
     assert_eq!(asked(Camera::new(Model::Dvxplorer, vec![])), order.concat());

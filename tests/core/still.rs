@@ -1,0 +1,149 @@
+//! Before a still scene nothing is read, and the reading of that ends; and what turns later is read soon and often.
+
+use evtach_core::{Event, Geometry, Poll, Reading, Settings, Status};
+use evtach_host::measure::{Capacity, with_tachometer};
+use evtach_host::synth::scene::Sensor;
+use evtach_host::synth::{Rotor, Scene, generate, presets};
+use evtach_tests::show;
+
+/// Readings of these recordings, of some seconds each, at most.
+const MOST_READINGS: usize = 200;
+
+/// A sensor that is noisy, and one that a hand holds before a wall.
+fn stills() -> [(&'static str, Scene); 2] {
+    let sensor = Sensor { noise_hz: 1.0, ..Sensor::default() };
+    let noise = Scene { rotors: Vec::new(), sensor, ..Scene::default() };
+    let (camera, background) = (presets::hand(), presets::wall());
+    let wall = Scene { rotors: Vec::new(), camera, background, ..Scene::default() };
+    [("noise", noise), ("wall", wall)]
+}
+
+/// Adds so much of a scene to what is there.
+fn then(events: &mut Vec<Event>, scene: &Scene, duration_ms: f64) -> u64 {
+    let begun_us = events.last().map_or(0, |last| last.t_us + 1);
+    let scene = Scene { duration_ms, ..scene.clone() };
+    let made = generate(&scene).expect("a scene in range").events;
+    events.extend(made.into_iter().map(|event| Event { t_us: begun_us + event.t_us, ..event }));
+    begun_us
+}
+
+/// What is read when it is measured `steps` at a time between two pushes of so much, and the rest at the end.
+fn read(events: &[Event], capacity: Capacity, piece_us: u64, steps: u32) -> Vec<Reading> {
+    let mut readings = Vec::new();
+    let settings = Settings::new(Geometry::new(346, 260).expect("a sensor in range"));
+    with_tachometer(settings, capacity, |tachometer| {
+        for piece in events.chunk_by(|a, b| a.t_us / piece_us == b.t_us / piece_us) {
+            tachometer.push(piece);
+            let mut left = steps;
+            while let Poll::Ready(reading) = tachometer.poll(left) {
+                readings.push(reading);
+                assert!(readings.len() < MOST_READINGS, "the same windows again and again");
+                left = left.min(steps / 2);
+            }
+        }
+        tachometer.finish();
+        while let Poll::Ready(reading) = tachometer.poll(u32::MAX) {
+            readings.push(reading);
+            assert!(readings.len() < MOST_READINGS, "the same windows again and again");
+        }
+    });
+    readings
+}
+
+fn end_us(reading: &Reading) -> u64 {
+    reading.t_us + u64::from(reading.window_us / 2)
+}
+
+fn has_speed(reading: &Reading) -> bool {
+    reading.rotors.iter().any(|rotor| rotor.speed.is_some())
+}
+
+/// Which windows were measured, and what came of them. How many events stand in a window that grew differs by one or two with how
+/// far its last segment was filled when it did.
+fn windows(readings: &[Reading]) -> Vec<(u64, u32, Status, usize)> {
+    let of = |r: &Reading| (r.t_us, r.window_us, r.status, r.rotors.len());
+    readings.iter().map(of).collect()
+}
+
+#[test]
+fn a_still_scene_ends_in_a_refusal_in_any_rhythm() {
+    for (name, still) in stills() {
+        let mut events = Vec::new();
+        then(&mut events, &still, 3_400.0);
+        for capacity in Capacity::ALL {
+            let promptly = read(&events, capacity, 500, u32::MAX);
+            let last = promptly.last().expect("a reading");
+            assert!(matches!(last.status, Status::Refused(_)), "{name}: {last:?}");
+            assert!(promptly.iter().all(|reading| !has_speed(reading)), "{name}: {promptly:#?}");
+            // From the second on that is two seconds long, they move on by a third.
+            let longest: Vec<u64> =
+                promptly.iter().filter(|r| r.window_us > 1_900_000).map(end_us).collect();
+            assert!(longest.len() >= 3, "{name}: {longest:?}");
+            assert!(longest.windows(2).all(|pair| pair[0] < pair[1]), "{name}: {longest:?}");
+            let in_pieces = read(&events, capacity, 20_000, u32::MAX);
+            assert_eq!(windows(&in_pieces), windows(&promptly), "{name}, {capacity:?}");
+            // A machine that hardly gets to measuring.
+            for steps in [0, 3, 40] {
+                let slowly = read(&events, capacity, 1_000, steps);
+                let last = slowly.last().expect("a reading");
+                assert!(matches!(last.status, Status::Refused(_)), "{name}: {last:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_turns_after_a_still_scene_is_read_soon_and_often() {
+    for (name, still) in stills() {
+        let fan =
+            Scene { rotors: vec![Rotor { rpm: 1500.0, ..Rotor::default() }], ..still.clone() };
+        let mut events = Vec::new();
+        then(&mut events, &still, 3_000.0);
+        let on_us = then(&mut events, &fan, 4_500.0);
+        for capacity in Capacity::ALL {
+            let readings = read(&events, capacity, 500, u32::MAX);
+            let seen: Vec<&Reading> =
+                readings.iter().filter(|reading| has_speed(reading)).collect();
+            let first_us = seen.first().map_or(u64::MAX, |first| end_us(first)) - on_us;
+            let often: Vec<&&Reading> =
+                seen.iter().filter(|reading| end_us(reading) > on_us + 3_500_000).collect();
+            show(&format!(
+                "{name}, {capacity:?}: first read {:.2} s after it was switched on; {} readings in the last second",
+                first_us as f64 * 1e-6,
+                often.len()
+            ));
+            assert!(first_us < 1_100_000, "{first_us}");
+            let least = if capacity == Capacity::Full { 18 } else { 10 };
+            assert!(often.len() >= least, "{}", often.len());
+            for reading in &seen {
+                let [rotor] = &reading.rotors[..] else { unreachable!("{reading:#?}") };
+                let rpm = rotor.speed.as_ref().map_or(0.0, |speed| speed.rpm());
+                assert!((rpm / 1500.0 - 1.0).abs() < 5e-3 && rotor.id == 0, "{reading:#?}");
+            }
+            let in_pieces = read(&events, capacity, 50_000, u32::MAX);
+            assert_eq!(windows(&in_pieces), windows(&readings), "{name}, {capacity:?}");
+        }
+    }
+}
+
+#[test]
+fn a_slow_rotor_after_a_still_scene_keeps_its_long_window() {
+    let [(_, still), _] = stills();
+    let slow = Scene { rotors: vec![Rotor { rpm: 60.0, ..Rotor::default() }], ..still.clone() };
+    let mut events = Vec::new();
+    then(&mut events, &still, 3_000.0);
+    let on_us = then(&mut events, &slow, 6_000.0);
+    for capacity in Capacity::ALL {
+        let readings = read(&events, capacity, 500, u32::MAX);
+        let behind: Vec<&Reading> =
+            readings.iter().filter(|reading| end_us(reading) > on_us + 2_700_000).collect();
+        assert!(behind.len() >= 4, "{readings:#?}");
+        for reading in behind {
+            assert_eq!(
+                (reading.status, reading.window_us),
+                (Status::Locked, 1_999_998),
+                "{reading:#?}"
+            );
+        }
+    }
+}
