@@ -27,41 +27,51 @@ pub struct Event {
 
 /// One event in eight bytes, as blocks carry it: its pixel, its polarity, and the low 32 bits of its time, so that it
 /// means something only beside a time that is near.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct PackedEvent {
     low_us: u32,
-    /// Column in bits 0 to 15, row in bits 16 to 30, bit 31: brighter.
-    pixel: u32,
+    /// As in a word of EVT 2, of which there are most: row in bits 0 to 10, column in bits 11 to 21, bit 28: brighter. The others mean
+    /// nothing.
+    word: u32,
 }
 
 impl PackedEvent {
     /// All bits zero.
-    pub const ZERO: Self = Self { low_us: 0, pixel: 0 };
-    /// Bit of the polarity in the pixel.
-    pub(crate) const BRIGHTER: u32 = 1 << 31;
-    /// Last row that fits: far off every sensor, so that rows beyond may well be taken for it.
-    const LAST_ROW: u16 = 0x7fff;
+    pub const ZERO: Self = Self { low_us: 0, word: 0 };
+    /// Where the column stands, and bits of either.
+    pub(crate) const COLUMN_AT: u32 = 11;
+    pub(crate) const SIDE_MASK: u32 = (1 << Self::COLUMN_AT) - 1;
+    const LAST_PIXEL: u32 = Self::SIDE_MASK << Self::COLUMN_AT | Self::SIDE_MASK;
+    /// Where the polarity stands.
+    pub(crate) const BRIGHTER_AT: u32 = 28;
 
-    /// Low 32 bits of the time in microseconds, column and row in pixels. The row is below 2^15.
+    /// Low 32 bits of the time in microseconds, column and row in pixels. Where either is beyond 2047, both become that: a pixel
+    /// that no sensor has but one of [`Geometry::MAX_PX`] in both directions.
     #[must_use]
     #[inline]
     pub const fn new(low_us: u32, x: u16, y: u16, polarity: Polarity) -> Self {
-        Self { low_us, pixel: (polarity as u32) << 31 | (y as u32) << 16 | x as u32 }
+        let pixel = Self::side(x, Self::COLUMN_AT) | Self::side(y, 0);
+        Self { low_us, word: (polarity as u32) << Self::BRIGHTER_AT | pixel }
     }
 
-    /// The same of a pixel that is packed already: column, row, and in the highest bit whether it became brighter.
+    /// A column or row where it stands in a packed event; of one beyond 2047 the far corner, whatever is joined to it.
     #[inline]
-    pub(crate) const fn of_pixel(low_us: u32, pixel: u32) -> Self {
-        Self { low_us, pixel }
+    pub(crate) const fn side(px: u16, at: u32) -> u32 {
+        if px as u32 <= Self::SIDE_MASK { (px as u32) << at } else { Self::LAST_PIXEL }
     }
 
-    /// The event with the high bits of its time left out; rows beyond 32 767 become that one.
+    /// The event of a word of EVT 2, or of one that is made up alike.
+    #[inline]
+    pub(crate) const fn of_word(low_us: u32, word: u32) -> Self {
+        Self { low_us, word }
+    }
+
+    /// The event with the high bits of its time left out; see [`PackedEvent::new`].
     #[must_use]
     #[inline]
     pub const fn pack(event: &Event) -> Self {
-        let y = if event.y < Self::LAST_ROW { event.y } else { Self::LAST_ROW };
-        Self::new(event.t_us as u32, event.x, y, event.polarity)
+        Self::new(event.t_us as u32, event.x, event.y, event.polarity)
     }
 
     /// The event, within 35 minutes before or after `near_us`, in microseconds.
@@ -69,27 +79,9 @@ impl PackedEvent {
     #[inline]
     pub const fn unpack(self, near_us: u64) -> Event {
         let step = self.low_us.wrapping_sub(near_us as u32) as i32;
-        Event {
-            t_us: near_us.saturating_add_signed(step as i64),
-            x: self.pixel as u16,
-            y: (self.pixel >> 16) as u16 & Self::LAST_ROW,
-            polarity: if self.pixel & Self::BRIGHTER == 0 { Polarity::Off } else { Polarity::On },
-        }
-    }
-
-    /// The bytes of a record: time, column, row and polarity, little-endian.
-    #[must_use]
-    #[inline]
-    pub const fn to_bytes(self) -> [u8; 8] {
-        ((self.pixel as u64) << 32 | self.low_us as u64).to_le_bytes()
-    }
-
-    /// What [`PackedEvent::to_bytes`] gave.
-    #[must_use]
-    #[inline]
-    pub const fn from_bytes(bytes: [u8; 8]) -> Self {
-        let both = u64::from_le_bytes(bytes);
-        Self { low_us: both as u32, pixel: (both >> 32) as u32 }
+        let (x, y) = self.pixel();
+        let polarity = if self.is_brighter() { Polarity::On } else { Polarity::Off };
+        Event { t_us: near_us.saturating_add_signed(step as i64), x, y, polarity }
     }
 
     /// Low 32 bits of the time in microseconds.
@@ -99,18 +91,34 @@ impl PackedEvent {
         self.low_us
     }
 
-    /// Column in bits 0 to 15, row in bits 16 to 30.
+    /// Its pixel, as in a word of EVT 2.
     #[inline]
-    pub(crate) const fn pixel(self) -> u32 {
-        self.pixel & !Self::BRIGHTER
+    pub(crate) const fn word(self) -> u32 {
+        self.word
     }
 
-    /// Column in bits 0 to 15, row in bits 16 to 30, bit 31: brighter.
+    /// Column and row in pixels.
     #[inline]
-    pub(crate) const fn pixel_and_polarity(self) -> u32 {
-        self.pixel
+    pub(crate) const fn pixel(self) -> (u16, u16) {
+        let x = self.word >> Self::COLUMN_AT & Self::SIDE_MASK;
+        (x as u16, (self.word & Self::SIDE_MASK) as u16)
+    }
+
+    /// Whether the pixel became brighter.
+    #[inline]
+    pub(crate) const fn is_brighter(self) -> bool {
+        self.word >> Self::BRIGHTER_AT & 1 == 1
     }
 }
+
+impl PartialEq for PackedEvent {
+    fn eq(&self, other: &Self) -> bool {
+        let near_us = u64::from(self.low_us);
+        self.low_us == other.low_us && self.unpack(near_us) == other.unpack(near_us)
+    }
+}
+
+impl Eq for PackedEvent {}
 
 /// Size of the sensor's pixel array, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -151,4 +159,38 @@ pub struct GyroSample {
     /// Roll rate of the camera in rad/s; positive when the camera turns so that a still scene turns
     /// clockwise on the screen.
     pub roll_rad_s: f32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_fits_comes_back_and_what_does_not_lies_in_the_far_corner() {
+        for (x, y, expected) in [
+            (0, 0, (0, 0)),
+            (345, 259, (345, 259)),
+            (2047, 2047, (2047, 2047)),
+            (2048, 3, (2047, 2047)),
+            (3, 2048, (2047, 2047)),
+            (u16::MAX, u16::MAX, (2047, 2047)),
+        ] {
+            for polarity in [Polarity::On, Polarity::Off] {
+                let event = Event { t_us: (1 << 32) + 5, x, y, polarity };
+                let (x, y) = expected;
+                assert_eq!(
+                    PackedEvent::pack(&event).unpack(u64::from(u32::MAX)),
+                    Event { x, y, ..event }
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn bits_that_mean_nothing_make_no_difference() {
+        let event = PackedEvent::new(5, 7, 9, Polarity::On);
+        assert_eq!(event, PackedEvent::of_word(5, event.word() | 0x3f << 22));
+        assert_ne!(event, PackedEvent::new(6, 7, 9, Polarity::On));
+        assert_ne!(event, PackedEvent::new(5, 7, 9, Polarity::Off));
+    }
 }

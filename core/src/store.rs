@@ -148,9 +148,10 @@ impl<'m> Store<'m> {
     /// Closes the open segment and opens the next. The ring must not be [`Self::full`].
     pub fn close_segment(&mut self) {
         debug_assert!(!self.full());
+        let before = self.segments[self.slot(self.closed)];
         self.closed += 1;
         let slot = self.slot(self.closed);
-        self.segments[slot] = Segment::default();
+        self.segments[slot] = Segment::after(&before, self.capacity);
     }
 
     /// Moves on from the oldest closed segment.

@@ -8,7 +8,7 @@ use embassy_time::{Duration, Instant, Timer};
 use evtach_core::{Geometry, GyroSample, PackedEvent};
 use heapless::Vec;
 
-use crate::record::{Decoder, Header, HeaderError, RECORD_BYTES};
+use crate::record::{Decoder, Header, HeaderError, RECORD_BYTES, pack};
 
 /// Events in one block: 128 x 8 B = 1 KiB; at 1 Mev/s a block fills in 128 us.
 pub const BLOCK_EVENTS: usize = 128;
@@ -211,7 +211,7 @@ pub async fn take_in<S: Source, M: RawMutex>(
         if let Some(slot) = slot {
             slot.clear();
             for (place, record) in slot.space().iter_mut().zip(&*records) {
-                *place = PackedEvent::from_bytes(*record);
+                *place = pack(*record);
             }
             slot.filled(records.len());
             slot.t_us = first_us;

@@ -18,7 +18,7 @@
 //! | 4 | column in pixels, u16 |
 //! | 6 | row in pixels in bits 0 to 14; bit 15: the pixel became brighter |
 
-use evtach_core::{Event, Geometry, PackedEvent};
+use evtach_core::{Event, Geometry, PackedEvent, Polarity};
 
 /// Bytes of one record.
 pub const RECORD_BYTES: usize = 8;
@@ -96,10 +96,32 @@ impl Header {
     }
 }
 
-/// The record of an event.
+/// Bit of the polarity in the row.
+const BRIGHTER: u16 = 1 << 15;
+
+/// The record of an event; rows beyond 32 767 become that one.
 #[must_use]
 pub fn encode(event: &Event) -> Record {
-    PackedEvent::pack(event).to_bytes()
+    let [t0, t1, t2, t3] = (event.t_us as u32).to_le_bytes();
+    let [x0, x1] = event.x.to_le_bytes();
+    let brighter = if event.polarity == Polarity::On { BRIGHTER } else { 0 };
+    let [y0, y1] = (event.y.min(BRIGHTER - 1) | brighter).to_le_bytes();
+    [t0, t1, t2, t3, x0, x1, y0, y1]
+}
+
+/// The record of an event in a block.
+#[must_use]
+pub(crate) fn encode_packed(event: PackedEvent) -> Record {
+    encode(&event.unpack(event.low_us().into()))
+}
+
+/// The event of a record, as blocks carry it.
+#[must_use]
+pub(crate) fn pack(record: Record) -> PackedEvent {
+    let [t0, t1, t2, t3, x0, x1, y0, y1] = record;
+    let (x, y) = (u16::from_le_bytes([x0, x1]), u16::from_le_bytes([y0, y1]));
+    let polarity = if y & BRIGHTER == 0 { Polarity::Off } else { Polarity::On };
+    PackedEvent::new(u32::from_le_bytes([t0, t1, t2, t3]), x, y & !BRIGHTER, polarity)
 }
 
 /// Turns records back into events.
@@ -117,7 +139,7 @@ impl Decoder {
 
     /// The event of a record. Records may lie up to 35 minutes before or after their predecessor.
     pub fn decode(&mut self, record: Record) -> Event {
-        let event = PackedEvent::from_bytes(record).unpack(self.latest_us);
+        let event = pack(record).unpack(self.latest_us);
         self.latest_us = event.t_us;
         event
     }
@@ -125,8 +147,6 @@ impl Decoder {
 
 #[cfg(test)]
 mod tests {
-    use evtach_core::Polarity;
-
     use super::*;
 
     const GEOMETRY: Geometry = Geometry { width_px: 346, height_px: 260 };

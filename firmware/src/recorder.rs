@@ -5,7 +5,7 @@
 use embedded_storage::Storage;
 use evtach_core::{Geometry, PackedEvent};
 
-use crate::record::{Header, RECORD_BYTES};
+use crate::record::{Header, RECORD_BYTES, encode_packed};
 
 /// Records that are written at once.
 const AT_ONCE: usize = 16;
@@ -93,7 +93,7 @@ impl<M: Storage> Recorder<M> {
         for events in events.chunks(AT_ONCE) {
             let mut bytes = [[0; RECORD_BYTES]; AT_ONCE];
             for (record, event) in bytes.iter_mut().zip(events) {
-                *record = event.to_bytes();
+                *record = encode_packed(*event);
             }
             let offset = self.events * RECORD_BYTES as u32;
             let bytes = &bytes.as_flattened()[..events.len() * RECORD_BYTES];

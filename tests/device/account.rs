@@ -12,7 +12,6 @@ use evtach_core::Ignored;
 use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
 use evtach_core::{Event, Geometry, Memory, Polarity, Settings, StoredEvent, Tachometer, Work};
 use evtach_firmware::intake::{BLOCKS, Block, Pace};
-use evtach_firmware::record::Decoder;
 use evtach_firmware::sensor::spi::{Acquired, AlwaysReady, Bridge, Kind, Lost, SpiSensor, acquire};
 
 const GEOMETRY: Geometry = Geometry { width_px: 320, height_px: 320 };
@@ -148,9 +147,8 @@ async fn measure(mut blocks: Receiver<'_, NoopRawMutex, Block>) -> Measured {
     let mut measured = Measured::default();
     for number in 1_u64.. {
         let block = blocks.receive().await;
-        let mut decoder = Decoder::new(block.t_us);
         let events: Vec<Event> =
-            block.events().iter().map(|event| decoder.decode(event.to_bytes())).collect();
+            block.events().iter().map(|event| event.unpack(block.t_us)).collect();
         measured.pushed += events.len() as u64;
         measured.off_sensor += events.iter().filter(|event| event.x >= 320).count() as u64;
         measured.told_lost += block.lost;

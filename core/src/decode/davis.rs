@@ -57,6 +57,10 @@ impl Davis {
         let room = events.len();
         let mut places = events.iter_mut();
         let mut t_us = *reached_us;
+        // Where in a packed event what row and event words tell stands.
+        let (row_at, at) =
+            if self.swap_xy { (PackedEvent::COLUMN_AT, 0) } else { (0, PackedEvent::COLUMN_AT) };
+        let mut row = PackedEvent::side(self.row, row_at);
         for (index, word) in words.iter().enumerate() {
             let word = u16::from_le_bytes(*word);
             let data = word & 0x0fff;
@@ -65,14 +69,18 @@ impl Davis {
                     self.common.clock.low(word);
                     t_us = t_us.max(offset_us.wrapping_add(self.common.clock.t_us()));
                 }
-                1 => self.row = data,
-                code @ (2 | 3) => {
+                1 => {
+                    self.row = data;
+                    row = PackedEvent::side(data, row_at);
+                }
+                2 | 3 => {
                     let Some(place) = places.next() else {
                         *reached_us = t_us;
                         return Packed { words: index, events: room, sample: None, reset: false };
                     };
-                    let (x, y) = if self.swap_xy { (self.row, data) } else { (data, self.row) };
-                    *place = PackedEvent::new(t_us as u32, x, y, polarity(code == 3));
+                    let brighter = u32::from(word >> 12 & 1) << PackedEvent::BRIGHTER_AT;
+                    let word = brighter | PackedEvent::side(data, at) | row;
+                    *place = PackedEvent::of_word(t_us as u32, word);
                 }
                 _ if word == CLOCK_RESET => {
                     let reset = index == 0;

@@ -60,12 +60,8 @@ impl Evt2 {
                 filled += run;
             }
             let Some(word) = words.get(taken) else { return (taken, filled) };
-            self.decode(u32::from_le_bytes(*word), |event| {
-                if let Some(place) = places.get_mut(filled) {
-                    *place = PackedEvent::pack(&event);
-                    filled += 1;
-                }
-            });
+            // No event, or one before the first time.
+            self.decode(u32::from_le_bytes(*word), drop);
             taken += 1;
         }
     }
@@ -78,15 +74,18 @@ impl Evt2 {
 }
 
 /// Packs events up to the first word that is none, and returns how many.
+// Not inlined, so that all it needs stays in registers.
+#[inline(never)]
 fn pack_run(words: &[[u8; 4]], places: &mut [PackedEvent], base_us: u32) -> usize {
-    let mut run = 0;
     let fours = words.as_chunks::<4>().0.iter().zip(places.as_chunks_mut::<4>().0);
+    let mut run = 0;
     for (words, places) in fours {
-        let [a, b, c, d] = words.map(u32::from_le_bytes);
+        let words = words.map(u32::from_le_bytes);
+        let [a, b, c, d] = words;
         if !is_event(a | b | c | d) {
             break;
         }
-        *places = [a, b, c, d].map(|word| pack(word, base_us));
+        *places = words.map(|word| pack(word, base_us));
         run += 4;
     }
     for (word, place) in words.iter().zip(places).skip(run) {
@@ -108,8 +107,7 @@ const fn is_event(word: u32) -> bool {
 
 #[inline(always)]
 const fn pack(word: u32, base_us: u32) -> PackedEvent {
-    let (x, y) = (word >> 11 & 0x7ff, word & 0x7ff);
-    PackedEvent::of_pixel(base_us | word >> 22 & 0x3f, (word >> PAYLOAD_BITS) << 31 | y << 16 | x)
+    PackedEvent::of_word(base_us | word >> 22 & 0x3f, word)
 }
 
 #[cfg(test)]

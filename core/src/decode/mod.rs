@@ -3,6 +3,7 @@
 //! Each decoder is a small state machine: one word in, the events it completes out through a closure. Time leaves
 //! as `u64` microseconds with the wraps of the wire's own counter already undone.
 
+mod checksum;
 mod davis;
 mod dvxplorer;
 mod evt2;
@@ -11,6 +12,7 @@ mod evt3;
 mod high;
 mod inivation;
 
+pub use checksum::crc32;
 pub use davis::Davis;
 pub use dvxplorer::Dvxplorer;
 pub use evt2::Evt2;

@@ -169,17 +169,19 @@ impl<'m> HeatMap<'m> {
     #[inline]
     pub fn count(&mut self, event: PackedEvent, weight_log2: u8) {
         let CellGrid { columns, cell_log2, .. } = self.grid;
-        let (x, y) = (event.pixel() & 0xffff, event.pixel() >> 16);
-        let cell = (y >> cell_log2) * columns as u32 + (x >> cell_log2);
+        let (x, y) = event.pixel();
+        let cell = u32::from(y >> cell_log2) * columns as u32 + u32::from(x >> cell_log2);
         if let Some(count) = self.counts.get_mut(cell as usize) {
             *count = count.saturating_add(1 << weight_log2);
         }
     }
 
-    /// Lets the map fade by one part in `window_segments`: called as each segment of a sliding window closes.
-    pub fn fade(&mut self, window_segments: u16) {
-        for count in self.counts.iter_mut() {
-            *count -= count.div_ceil(window_segments);
+    /// Lets the map fade by one part in `window_segments`, for each of so many segments by which a window slid.
+    pub fn fade(&mut self, segments: usize, window_segments: u16) {
+        for count in self.counts.iter_mut().filter(|count| **count > 0) {
+            for _ in 0..segments {
+                *count -= count.div_ceil(window_segments);
+            }
         }
     }
 

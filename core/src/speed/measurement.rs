@@ -455,10 +455,11 @@ impl Measurement {
         let half_way = 0.5 / (rivals as f32 + 1.0);
         let agreement =
             half_way.clamp(COARSE_AGREEMENT, MOST_COARSE_AGREEMENT) * self.omega_rad_s.abs();
+        // Where the events are too few for slices, refinement and lock are the first registrations.
         let agrees = self
             .evidence
             .initial_rad_s
-            .is_some_and(|initial| (initial - self.omega_rad_s).abs() < agreement);
+            .is_none_or(|initial| (initial - self.omega_rad_s).abs() < agreement);
         if !agrees && !self.sharp() {
             return self.refuse(Reason::Ambiguous);
         }

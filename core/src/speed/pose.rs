@@ -26,8 +26,8 @@ use crate::math::{TAU, Turn, TurnRate, larger, quick_sqrt, sqrt};
 use crate::rotors::Disc;
 use crate::store::{Even, Window};
 use blocks::{
-    BLOCK_SHARE, Block, LEAST_SHARE, MOST_FINE_WALK, MOST_WALK, WALK_PX, WALK_SINGLE_PX, WALK_US,
-    Walk, correct,
+    BLOCK_SHARE, Block, LEAST_SHARE, MOST_FINE_WALK, MOST_WALK, Seen, WALK_PX, WALK_SINGLE_PX,
+    WALK_US, Walk, correct,
 };
 use schedule::{Phase, Schedule};
 use template::{BANKS, Counts, RINGS, Template};
@@ -283,6 +283,11 @@ impl Pose {
         self.sift(sums);
         if self.schedule.phase() == Phase::Last {
             self.slope = self.trend(sums);
+            if self.slope.is_none() && self.harmonic > self.first_harmonic {
+                // Too few blocks are in step.
+                self.step_back();
+                return false;
+            }
             let (x_px, y_px) = self.path.centre();
             self.disc.x_px += x_px;
             self.disc.y_px += y_px;
@@ -359,6 +364,7 @@ impl Pose {
         let rings = (RINGS / self.sectors as usize).max(1);
         let rings_per_px = rings as f32 / self.disc.radius_px.max(1.0);
         let doubles = self.may_double();
+        let mut seen = Vec::new();
         for event in window.segment(self.segment).iter().step_by(stride) {
             let t_us = disc.since_middle_us(*event);
             let (index, f) = self.path.place(t_us as f32);
@@ -379,8 +385,15 @@ impl Pose {
             let (re, im) = phases[bank];
             let off = (s * re - c * im, c * re + s * im);
             let per_r2 = 1.0 / r2;
-            sums.blocks[index].add((-y_px * per_r2, x_px * per_r2), off, (t_us as f32, f));
+            let (x, y) = (-y_px * per_r2, x_px * per_r2);
+            let (sin_psi, cos_psi) = off;
+            let t_us = t_us as f32;
+            seen.push(Seen { block: index, x, y, sin_psi, cos_psi, t_us, f }).ok();
+            if seen.is_full() {
+                blocks::add(&mut sums.blocks, &mut seen);
+            }
         }
+        blocks::add(&mut sums.blocks, &mut seen);
     }
 
     /// Leaves out blocks that are not in step with the rest: the path between their neighbours brings them back.

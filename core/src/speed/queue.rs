@@ -2,8 +2,13 @@
 //!
 //! Where many pixels fire, events come at random: the time that a number of them takes scatters as in a Poisson
 //! process. From a queue that never runs empty they come like a clock. While such a queue fills, time is
-//! stretched, and all speeds are read too low by the same share; nothing else in the events tells.
+//! stretched, and all speeds are read too low by the same share; nothing else in the events' times tells.
+//!
+//! But while it fills, no event is lost. Where a rotor's pixels see few of the blades that pass, most are: the queue is full,
+//! and filled within the first moments of the window, or before. From then on all events are late alike.
 
+use crate::math::larger;
+use crate::rotors::Disc;
 use crate::store::{StoredEvent, Window};
 
 /// Events whose time is taken together: few against those of one edge that crosses a pixel, many against the microsecond.
@@ -20,10 +25,16 @@ const MOST_SCATTER: f32 = 0.2;
 /// Events that a readout may hold.
 const QUEUE_EVENTS: f32 = 4_096.0;
 
-/// Share by which the time of the window may be stretched: 0 unless the readout was busy all through it.
-/// Cost: 20 000 instructions, and one pass over the window where it was.
+/// Events of a pixel for each blade that passes, below which most are lost: a blade leaves one or two, of both polarities, and a
+/// mark on a disc, which passes half of it, half as many.
+const MOST_SEEN: f32 = 0.3;
+/// A line through times of which the first share x is early by the share y of all is tilted by 6 x y at most.
+const TILT: f32 = 6.0;
+
+/// Share by which the time of the window may be stretched as a rotor's speed is read: 0 unless the readout was busy all through
+/// it. The rotor's blades pass so many times. Cost: 20 000 instructions, and one pass over the window where it was.
 #[must_use]
-pub fn stretch(window: &Window<'_>) -> f32 {
+pub fn stretch(window: &Window<'_>, disc: Disc, periods: Option<f32>) -> f32 {
     let (mut scatter, mut degrees) = (0.0, 0_u32);
     for segment in 0..window.segments() {
         let (found, groups) = paces(window, segment);
@@ -33,8 +44,19 @@ pub fn stretch(window: &Window<'_>) -> f32 {
     if degrees < LEAST_GROUPS || scatter > MOST_SCATTER * degrees as f32 {
         return 0.0;
     }
-    let arrived: f32 = window.events().map(|event| f32::from(1_u16 << event.weight_log2())).sum();
-    QUEUE_EVENTS / arrived.max(QUEUE_EVENTS)
+    let (mut arrived, mut of_rotor) = (0.0, 0.0);
+    for event in window.events() {
+        let stands_for = f32::from(1_u16 << event.weight_log2());
+        let at = Disc { x_px: event.x().into(), y_px: event.y().into(), radius_px: 0.0 };
+        arrived += stands_for;
+        if disc.distance2(&at) < disc.radius_px * disc.radius_px {
+            of_rotor += stands_for;
+        }
+    }
+    let whole = QUEUE_EVENTS / larger(arrived, QUEUE_EVENTS);
+    let seen = core::f32::consts::PI * disc.radius_px * disc.radius_px * periods.unwrap_or(0.0);
+    // At least as many are lost as come, so that the queue is full when as many as it holds have come.
+    if of_rotor < MOST_SEEN * seen { (TILT * whole * whole).min(whole) } else { whole }
 }
 
 /// Variance of the time that a group takes over that of a Poisson process, times the degrees of freedom, and these.
@@ -67,6 +89,11 @@ mod tests {
 
     /// The stretch of a window of events whose distances are told in nanoseconds.
     fn of(distance_ns: impl Fn(u64) -> u64) -> f32 {
+        around(Disc::default(), None, distance_ns)
+    }
+
+    /// The same as a rotor's speed is read.
+    fn around(disc: Disc, periods: Option<f32>, distance_ns: impl Fn(u64) -> u64) -> f32 {
         let mut memory = vec![StoredEvent::default(); MOST_SEGMENTS * 2_048];
         let mut store = Store::new(&mut memory, MOST_SPARE, 25_000);
         let mut t_ns = 0;
@@ -81,7 +108,7 @@ mod tests {
             }
             store.push(&[PackedEvent::new(t_us as u32, 1, 1, Polarity::On)], 0, |_, _| {});
         }
-        stretch(&store.window(6, u64::MAX))
+        stretch(&store.window(6, u64::MAX), disc, periods)
     }
 
     /// Exponentially distributed with a mean of one, from a hash.
@@ -104,5 +131,16 @@ mod tests {
     fn the_stretch_is_the_queue_over_the_events() {
         let found = of(|_| 1_000);
         assert!((found / (4_096.0 / 150_000.0) - 1.0).abs() < 0.05, "{found}");
+    }
+
+    #[test]
+    fn where_pixels_miss_most_blades_the_queue_filled_at_once() {
+        // All events within 314 pixels, which see 500 or 5 000 blades pass.
+        let disc = Disc { x_px: 1.0, y_px: 1.0, radius_px: 10.0 };
+        let whole = 4_096.0 / 150_000.0;
+        let complete = around(disc, Some(500.0), |_| 1_000);
+        assert!((complete / whole - 1.0).abs() < 0.05, "{complete}");
+        let lost = around(disc, Some(5_000.0), |_| 1_000);
+        assert!((lost / (6.0 * whole * whole) - 1.0).abs() < 0.1, "{lost}");
     }
 }

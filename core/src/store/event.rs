@@ -28,9 +28,8 @@ pub(crate) const MOST_WEIGHT_LOG2: u8 = 15;
 impl StoredEvent {
     #[inline]
     pub(super) const fn store(event: PackedEvent, weight_log2: u8) -> Self {
-        let pixel = event.pixel_and_polarity();
-        let stored =
-            Self { t_us: event.low_us(), x: pixel as u16, y_weight_polarity: (pixel >> 16) as u16 };
+        let ((x, y), polarity) = (event.pixel(), event.is_brighter() as u16 * POLARITY_BIT);
+        let stored = Self { t_us: event.low_us(), x, y_weight_polarity: y | polarity };
         stored.weighing(weight_log2)
     }
 

@@ -95,6 +95,7 @@ impl Store<'_> {
         while weight >> stride_log2 >= room(stride_log2) as u64 && stride_log2 < MOST_WEIGHT_LOG2 {
             stride_log2 += 1;
         }
-        Segment { stride_log2, ..Segment::default() }
+        // What is kept stands for at least as many, and some for more.
+        Segment { stride_log2, heaviest_log2: MOST_WEIGHT_LOG2, ..Segment::default() }
     }
 }

@@ -1,5 +1,7 @@
 //! The open segment: which of its events are kept.
 
+use core::cell::Cell;
+
 use super::event::MOST_WEIGHT_LOG2;
 use super::{Store, StoredEvent};
 use crate::event::PackedEvent;
@@ -20,10 +22,34 @@ pub(super) struct Segment {
     pub lost: u64,
     pub roll_sum_rad_s: f32,
     pub roll_count: u32,
-    /// Every 2^stride_log2-th event is kept.
+    /// Every 2^stride_log2-th event is kept, behind the burst and its octaves.
     pub stride_log2: u8,
     /// Events to pass over before the next is kept.
     pub skip: u32,
+    /// Most that an event stood for when it came, as a power of two.
+    pub heaviest_log2: u8,
+}
+
+impl Segment {
+    /// The segment after one: it begins with the stride that it will need, or one a little finer, if as many events come as
+    /// before. The same is kept as if it began with every event, but for the work of thinning them; where so few come that it need not
+    /// have been so sparse, fewer are.
+    pub fn after(before: &Self, capacity: usize) -> Self {
+        let overfull = before.counted.checked_div(capacity as u64).unwrap_or(0);
+        let stride_log2 = overfull.checked_ilog2().unwrap_or(0) as u8;
+        Self { stride_log2: stride_log2.min(MOST_WEIGHT_LOG2), ..Self::default() }
+    }
+
+    /// How many events the next that is kept stands for, as a power of two, and the place up to which that holds.
+    fn step(&self, capacity: usize) -> (u8, usize) {
+        for octave in 0..self.stride_log2.min(OCTAVES + 1) {
+            let end = as_they_came(capacity, octave);
+            if self.len < end {
+                return (octave, end);
+            }
+        }
+        (self.stride_log2, capacity)
+    }
 }
 
 impl Store<'_> {
@@ -47,11 +73,11 @@ impl Store<'_> {
                 self.make_room(slot);
             }
             let segment = &mut self.segments[slot];
-            let step_log2 = segment.stride_log2;
+            let (step_log2, end) = segment.step(self.capacity);
             let stride_log2 = step_log2.saturating_sub(weight_log2);
             let stands_log2 = step_log2.max(weight_log2);
             let base = slot * self.capacity;
-            let places = self.events.get_mut(base + segment.len..base + self.capacity);
+            let places = self.events.get_mut(base + segment.len..base + end);
             let places = places.unwrap_or_default();
             // As many as go by the same step.
             let every = events[next..].iter().step_by(1 << stride_log2);
@@ -70,6 +96,7 @@ impl Store<'_> {
             rest = (1 << step_log2) - 1;
         }
         let segment = &mut self.segments[slot];
+        segment.heaviest_log2 = segment.heaviest_log2.max(weight_log2);
         rest &= (1 << weight_log2) - 1;
         segment.skip = (next.saturating_sub(events.len()) as u32) << weight_log2 | rest;
         let arrived = (events.len() as u64) << weight_log2;
@@ -86,13 +113,29 @@ impl Store<'_> {
         let sparser = &mut self.events[base + first..base + self.capacity];
         let mut kept = sparser.len();
         while kept == sparser.len() && segment.stride_log2 < MOST_WEIGHT_LOG2 {
+            let alike = segment.heaviest_log2 <= segment.stride_log2;
             segment.stride_log2 += 1;
-            kept = thin(sparser, segment.stride_log2);
+            kept = if alike {
+                halve(sparser, segment.stride_log2)
+            } else {
+                thin(sparser, segment.stride_log2)
+            };
         }
         kept = kept.min(sparser.len().saturating_sub(1));
         self.thinned += (sparser.len() - kept) as u64;
         segment.len = first + kept;
     }
+}
+
+/// Thins events that all stand for the same, so that each that is left stands for 2^`weight_log2`, twice as many; returns how many
+/// are left. What [`thin`] does, in a fifth of the time.
+fn halve(events: &mut [StoredEvent], weight_log2: u8) -> usize {
+    let left = events.len().div_ceil(2);
+    let events = Cell::from_mut(events).as_slice_of_cells();
+    for (place, event) in events.iter().zip(events.iter().step_by(2)) {
+        place.set(event.get().weighing(weight_log2));
+    }
+    left
 }
 
 /// Thins events until each stands for 2^`weight_log2` or, where it already does, for more; returns how many are left. Those that are

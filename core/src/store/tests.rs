@@ -167,3 +167,44 @@ fn lengthening_keeps_order_counts_and_the_first_burst() {
     fill(&mut store, 6_500..40_000);
     assert!(times(&store).windows(2).all(|pair| pair[0] < pair[1]));
 }
+
+#[test]
+fn a_segment_begins_as_sparse_as_it_will_be_and_keeps_what_it_would_have_kept() {
+    for (step_us, segment_us) in [(1, 5_000), (1, 1_000), (3, 700), (7, 300)] {
+        let (mut memory, mut fresh) = (
+            [StoredEvent::default(); 64 * MOST_SEGMENTS],
+            [StoredEvent::default(); 64 * MOST_SEGMENTS],
+        );
+        let mut store = Store::new(&mut memory, MOST_SPARE, segment_us);
+        let last_us = u64::from(segment_us) * 3;
+        fill(&mut store, (0..last_us).step_by(step_us));
+        let counted = store.account(1).counted;
+        assert!(counted < 64 || store.segments[1].stride_log2 > 0);
+        for segment in 0..3_u64 {
+            // Alone, with nothing before it.
+            let first_us = segment * u64::from(segment_us);
+            let mut alone = Store::new(&mut fresh, MOST_SPARE, segment_us);
+            alone.restart(first_us, segment_us);
+            fill(
+                &mut alone,
+                (first_us.next_multiple_of(step_us as u64)..first_us + u64::from(segment_us))
+                    .step_by(step_us),
+            );
+            let window = store.window(MOST_SEGMENTS, u64::MAX);
+            assert_eq!(window.segment(segment as usize), alone.window(1, u64::MAX).segment(0));
+        }
+    }
+}
+
+#[test]
+fn a_segment_after_a_far_busier_one_still_begins_with_a_burst_and_tells_what_it_left_out() {
+    let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
+    let mut store = Store::new(&mut memory, MOST_SPARE, 10_000);
+    fill(&mut store, (0..10_000).chain((10_000..20_000).step_by(100)));
+    let window = store.window(2, u64::MAX);
+    let quiet = window.segment(1);
+    assert!(quiet[..16].windows(2).all(|pair| pair[1].since(0) - pair[0].since(0) == 100));
+    let stands_for: i32 = quiet.iter().map(|event| 1 << event.weight_log2()).sum();
+    // The last stands for as many as it would have, had as many come as before.
+    assert!((100..100 + 256).contains(&stands_for), "{stands_for}");
+}

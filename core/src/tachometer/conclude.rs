@@ -138,9 +138,7 @@ impl Tachometer<'_> {
     }
 
     fn fade(&mut self, segments: usize) {
-        for _ in 0..segments {
-            self.heat.fade(WINDOW_SEGMENTS as u16);
-        }
+        self.heat.fade(segments, WINDOW_SEGMENTS as u16);
     }
 }
 

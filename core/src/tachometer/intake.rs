@@ -180,7 +180,7 @@ impl Tachometer<'_> {
                     return;
                 }
                 self.ignored.overrun += self.store.give_up(self.window_segments);
-                self.heat.fade(WINDOW_SEGMENTS as u16);
+                self.heat.fade(1, WINDOW_SEGMENTS as u16);
             }
             self.store.close_segment();
             self.begin();

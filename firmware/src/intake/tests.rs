@@ -59,11 +59,10 @@ fn play<T>(
 
 /// Everything up to the last block: events, and how many were lost before each block.
 async fn all(mut blocks: Receiver<'_, NoopRawMutex, Block>) -> (Heap<Event>, Heap<u64>) {
-    let mut decoder = Decoder::new(500);
     let (mut events, mut lost) = (Heap::new(), Heap::new());
     loop {
         let block = blocks.receive().await;
-        events.extend(block.events().iter().map(|event| decoder.decode(event.to_bytes())));
+        events.extend(block.events().iter().map(|event| event.unpack(block.t_us)));
         lost.push(block.lost);
         let last = block.last;
         blocks.receive_done();

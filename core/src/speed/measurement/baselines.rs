@@ -74,7 +74,11 @@ impl Measurement {
         if (refined.omega_rad_s - self.omega_rad_s).abs()
             > COARSE_AGREEMENT * self.omega_rad_s.abs()
         {
-            return self.refuse(Reason::Ambiguous);
+            if self.registers() {
+                return self.refuse(Reason::Ambiguous);
+            }
+            self.stage = Stage::Verdict;
+            return;
         }
         self.plan(window, REFINEMENT_PERIODS, self.worth(FURTHER));
         if let Some(pairs) = &mut self.pairs {

@@ -17,6 +17,8 @@ const MOST_BLUR: (f32, f32) = (0.1, 1.5);
 const LEAST_BLUR: (f32, f32) = (0.06, 1.3);
 /// Standard deviation of the events' times in dim light.
 const MOST_JITTER_S: f32 = 150e-6;
+/// Scatter of a phase by that jitter beyond which a registration is not believed where it contradicts.
+const MOST_SCATTER_RAD: f32 = 0.8;
 /// Blur that a jitter of one pixel makes as the pose measures it, where the harmonic rises by doubling: up to half an octave
 /// past the best, where 1 / (m exp(-m^2 / 2)) is 1.9.
 const BLUR_OF_JITTER: f32 = 1.9;
@@ -67,18 +69,15 @@ impl Measurement {
             .map(|lock| self.with_bias(lock));
         let phase = witness(self.evidence.phase_rad_s, self.evidence.phase_sigma_rad_s);
         let window_s = window.duration_us as f32 * 1e-6;
-        let held_up = QUEUE_SIGMA * stretch(window);
+        let held_up = QUEUE_SIGMA * stretch(window, self.disc, self.evidence.periods);
+        // What jitter leads astray says nothing.
+        let lock = lock.filter(|lock| self.registers() || self.bears_out(*lock, phase));
         if let (Some(lock), Some(phase)) = (lock, phase) {
-            let apart = (lock.omega_rad_s - phase.omega_rad_s).abs();
-            let sigma =
-                sqrt(lock.sigma_rad_s * lock.sigma_rad_s + phase.sigma_rad_s * phase.sigma_rad_s);
-            let agree = apart < (LOCK_AGREEMENT * lock.omega_rad_s.abs()).max(LOCK_SIGMAS * sigma);
-            let whole = self.fits_between();
             let both = combine(lock, phase);
             let sharp = both.sigma_rad_s.max(held_up * both.omega_rad_s.abs())
                 < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
             let long = self.wanted_us <= 1.02 * window.duration_us as f32;
-            if !agree || !whole {
+            if !self.bears_out(lock, Some(phase)) {
                 self.status = Status::Refused(Reason::Ambiguous);
             } else if sharp && long {
                 self.estimate = both;
@@ -118,6 +117,23 @@ impl Measurement {
         let late = held_up * self.estimate.omega_rad_s;
         self.estimate.sigma_rad_s = sqrt(own * own + late * late + clock * clock);
         self.roll_sigma_rad_s = roll;
+    }
+
+    /// Whether the lock bears the phase out, and the rotor is where it should be between whole periods.
+    fn bears_out(&self, lock: Estimate, phase: Option<Estimate>) -> bool {
+        phase.is_some_and(|phase| {
+            let apart = (lock.omega_rad_s - phase.omega_rad_s).abs();
+            let (a, b) = (lock.sigma_rad_s, phase.sigma_rad_s);
+            let most = LOCK_SIGMAS * sqrt(a * a + b * b);
+            apart < (LOCK_AGREEMENT * lock.omega_rad_s.abs()).max(most) && self.fits_between()
+        })
+    }
+
+    /// Whether jitter may scatter the blades' edges over so much of their distance that a registration matches noise: no overtone is
+    /// left of them. Then the phase alone tells, by all events of the window.
+    pub(super) fn registers(&self) -> bool {
+        let scatter_rad = self.harmonic as f32 * self.omega_rad_s.abs() * MOST_JITTER_S;
+        scatter_rad < MOST_SCATTER_RAD || self.pose.has_overtone() || self.doubted()
     }
 
     /// Whether the rotor is also where it should be between whole periods, where an alias is not.
@@ -197,6 +213,12 @@ impl Measurement {
         }
     }
 
+    /// Whether all segments turn alike, as far as registration tells.
+    fn rates_alike(&self, omega: f32) -> bool {
+        let alike = |rate: &f32| (rate - omega).abs() < COARSE_SPREAD * omega.abs();
+        !self.rates.is_empty() && self.rates.iter().all(alike)
+    }
+
     /// Whether a reading without a lock may stand: it has no long baseline to contradict it, so the phase must advance
     /// evenly through the window, and all segments must turn alike.
     fn coarse_stands(&self, phase: Option<Estimate>) -> bool {
@@ -205,13 +227,12 @@ impl Measurement {
             (phase.omega_rad_s - omega).abs() < COARSE_PHASE * omega.abs()
                 && phase.sigma_rad_s < COARSE_PHASE_SIGMA * omega.abs()
         });
-        let alike = |rate: &f32| (rate - omega).abs() < COARSE_SPREAD * omega.abs();
-        even && !self.doubted() && (self.rates.iter().all(alike) || self.sharp())
+        even && !self.doubted() && (self.rates_alike(omega) || self.sharp())
     }
 }
 
-/// Mean weighted by the inverse variances. The witnesses look at the same events, so the error is not taken to
-/// shrink by having two.
+/// Mean weighted by the inverse variances. The witnesses look at the same events, so their errors are taken for one: it
+/// does not shrink by having two.
 fn combine(a: Estimate, b: Estimate) -> Estimate {
     let (va, vb) = (a.sigma_rad_s * a.sigma_rad_s, b.sigma_rad_s * b.sigma_rad_s);
     let (wa, wb) = (vb / (va + vb), va / (va + vb));
@@ -219,7 +240,7 @@ fn combine(a: Estimate, b: Estimate) -> Estimate {
     let apart = (a.omega_rad_s - b.omega_rad_s) * (a.omega_rad_s - b.omega_rad_s) / (va + vb);
     Estimate {
         omega_rad_s: a.omega_rad_s * wa + b.omega_rad_s * wb,
-        sigma_rad_s: sqrt((wa * va + wb * vb) * apart.max(1.0)),
+        sigma_rad_s: (wa * a.sigma_rad_s + wb * b.sigma_rad_s) * sqrt(apart.max(1.0)),
     }
 }
 

@@ -7,7 +7,7 @@ use super::super::path::Path;
 use crate::limits::MAX_KNOTS;
 
 /// Fewest events in a block that counts.
-const LEAST_IN_BLOCK: f32 = 16.0;
+const LEAST_IN_BLOCK: f32 = 8.0;
 /// Share of a block's events in step, over that of all, below which the block is not believed, and the least.
 pub const BLOCK_SHARE: f32 = 0.4;
 pub const LEAST_SHARE: f32 = 0.05;
@@ -26,6 +26,38 @@ pub const WALK_SINGLE_PX: f32 = 0.05;
 const WALK_RAD: f32 = 0.02;
 /// Farthest that a knot is moved at once.
 const STRIDE_PX: f32 = 3.0;
+
+/// What an event says to its block.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    pub block: usize,
+    /// How its direction changes with a shift: -sin / r and cos / r.
+    pub x: f32,
+    pub y: f32,
+    /// Its phase off the template.
+    pub sin_psi: f32,
+    pub cos_psi: f32,
+    /// Time since the middle of the window, and how far through the block that is.
+    pub t_us: f32,
+    pub f: f32,
+}
+
+/// Events that are added at once.
+pub const SEEN_AT_ONCE: usize = 16;
+
+/// Adds events to their blocks, and forgets them.
+// Apart from where they are looked at, where registers are scarce: here a block's sums stay in them from event to event.
+#[inline(never)]
+pub fn add(blocks: &mut [Block], seen: &mut Vec<Seen, SEEN_AT_ONCE>) {
+    for alike in seen.chunk_by(|a, b| a.block == b.block) {
+        if let Some(block) = alike.first().and_then(|first| blocks.get_mut(first.block)) {
+            let mut sums = *block;
+            alike.iter().for_each(|seen| sums.add(seen));
+            *block = sums;
+        }
+    }
+    seen.clear();
+}
 
 /// Sums over the events of a block. An event's phase changes with turn and shift by m (1, -sin / r, cos / r), with m the
 /// harmonic; m is left out of the sums.
@@ -73,15 +105,9 @@ impl Block {
         way: [0.0; 2],
     };
 
-    /// Adds an event: how its direction changes with a shift, its phase off the template, and when it came.
-    // A function of its own: where it is called registers are scarce, and a fifth of the instructions would shuffle them.
-    #[inline(never)]
-    pub fn add(
-        &mut self,
-        (x, y): (f32, f32),
-        (sin_psi, cos_psi): (f32, f32),
-        (t_us, f): (f32, f32),
-    ) {
+    #[inline]
+    fn add(&mut self, seen: &Seen) {
+        let &Seen { x, y, sin_psi, cos_psi, t_us, f, .. } = seen;
         let (x_psi, y_psi, late) = (x * sin_psi, y * sin_psi, f * sin_psi);
         self.count += 1.0;
         self.levers[0] += x;

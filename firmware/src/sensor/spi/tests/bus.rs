@@ -11,7 +11,6 @@ use embedded_hal_async::spi::{ErrorType, Operation, SpiBus, SpiDevice};
 
 use super::*;
 use crate::intake::{BLOCK_EVENTS, BLOCKS, Block, Pace};
-use crate::record::Decoder;
 use crate::test_time::block_on;
 
 /// A bus behind which lie bytes; after them it shifts in ones, as one with nobody on it.
@@ -123,8 +122,7 @@ async fn all(blocks: &mut Receiver<'_, NoopRawMutex, Block>) -> (Vec<Event>, u64
     let (mut events, mut lost) = (Vec::new(), 0);
     loop {
         let block = blocks.receive().await;
-        let mut decoder = Decoder::new(block.t_us);
-        events.extend(block.events().iter().map(|event| decoder.decode(event.to_bytes())));
+        events.extend(block.events().iter().map(|event| event.unpack(block.t_us)));
         lost += block.lost;
         assert!(block.events().is_empty() || block.geometry == GEOMETRY);
         let last = block.last;

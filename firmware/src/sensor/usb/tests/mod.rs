@@ -18,7 +18,6 @@ use evtach_core::{Event, Geometry, GyroSample, Polarity};
 use super::emulated::{Act, Camera, Device, Fault, Port, World};
 use super::*;
 use crate::intake::{BLOCK_EVENTS, BLOCKS, Block};
-use crate::record::Decoder;
 use crate::test_time::block_on;
 
 mod faults;
@@ -92,8 +91,7 @@ fn run(port: &Port, most_ev_s: u32, ms: u64, done: impl Fn(&Acquired, &World) ->
 
 fn drain(blocks: &mut Receiver<'_, NoopRawMutex, Block>, heard: &mut Heard) {
     while let Some(block) = blocks.try_receive() {
-        let mut decoder = Decoder::new(block.t_us);
-        heard.events.extend(block.events().iter().map(|event| decoder.decode(event.to_bytes())));
+        heard.events.extend(block.events().iter().map(|event| event.unpack(block.t_us)));
         heard.gyro.extend(block.gyro.iter());
         heard.lost += block.lost;
         heard.geometry = Some(block.geometry);
