@@ -24,8 +24,10 @@ pub const VISITS: usize = 6_144;
 /// Events of one rotor in polar coordinates: 3 072 x 8 B = 24 KiB.
 pub const POLAR_EVENTS: usize = 3_072;
 
-/// Cells of the coherence map: 576 x 20 B = 11 KiB; 24 x 24 cells cover the square around a disc.
-pub const COHERENCE_CELLS: usize = 576;
+/// Most cells in a row of the coherence map, which covers the square around a disc.
+pub const COHERENCE_COLUMNS: usize = 24;
+/// Cells of the coherence map: 576 x 20 B = 11 KiB.
+pub const COHERENCE_CELLS: usize = COHERENCE_COLUMNS * COHERENCE_COLUMNS;
 
 /// Phasors in one look for a winding: 128 x 24 B = 3 KiB.
 pub const WINDING_PHASORS: usize = 128;

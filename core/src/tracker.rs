@@ -33,6 +33,14 @@ impl Known {
     pub const fn can_be_followed(&self) -> bool {
         self.missed == 0 && self.locked
     }
+
+    /// What is measured again where the last reading saw a rotor without locking it, even if a search misses it: by its
+    /// parts, which keep step also where its speed is not known so well yet.
+    #[must_use]
+    pub fn suspected(&self) -> Option<Found> {
+        let windings = self.parts.map_or(self.found.windings, u32::from);
+        (self.missed == 0 && !self.locked).then_some(Found { windings, ..self.found })
+    }
 }
 
 /// The rotors seen so far.

@@ -181,7 +181,6 @@ fn one_locked_while_another_is_refused() {
 
 /// More parts than are named: the speed, and no blade count.
 #[test]
-#[ignore = "16 spokes are refused as no_rotation in the device's memory; all else holds"]
 fn nine_eleven_and_sixteen_spokes() {
     let mut wrong = Vec::new();
     for (seed, blades) in [(70, 9), (71, 11), (72, 16)] {

@@ -21,7 +21,7 @@ mod split;
 
 use heapless::Vec;
 
-use super::coherence::Coherence;
+use super::coherence::{Coherence, LocalGrid};
 use super::disc::{Disc, Sifting};
 use super::heat::{CellGrid, Cells};
 use super::kmeans::{Cluster, KMeans, Seeding};
@@ -145,7 +145,7 @@ pub struct Extraction {
     /// Whether the cells of this quarter have been made finer.
     finer: bool,
     /// Grid of the local map at hand.
-    local: CellGrid,
+    local: LocalGrid,
     /// What one rotation explains of the whole map.
     whole: Option<Found>,
     /// What rotations of their own explain of its parts.

@@ -43,21 +43,6 @@ impl CellGrid {
         }
     }
 
-    /// The grid of cells of about `cell_px` (a power of two, at least 2) that shows the square of `half_px` about a point, or
-    /// a coarser one that fits `capacity` cells.
-    #[must_use]
-    pub fn around(x_px: f32, y_px: f32, half_px: f32, cell_px: f32, capacity: usize) -> Self {
-        let (x0, y0) = ((x_px - half_px).max(0.0) as u16, (y_px - half_px).max(0.0) as u16);
-        let side = ((2.0 * half_px) as u16).clamp(1, Geometry::MAX_PX);
-        let square = Geometry { width_px: side, height_px: side };
-        let mut cell_log2 = 1;
-        // Nearest on the logarithmic scale.
-        while core::f32::consts::SQRT_2 * ((1_u16 << cell_log2) as f32) < cell_px && cell_log2 < 8 {
-            cell_log2 += 1;
-        }
-        Self { x0, y0, ..Self::fit(square, cell_log2, capacity) }
-    }
-
     /// The same area in cells of twice the side.
     #[must_use]
     pub const fn coarser(self) -> Self {

@@ -14,8 +14,8 @@ use super::disc::Disc;
 use crate::limits::WINDING_PHASORS;
 use crate::math::sqrt;
 
-/// Most windings that are tried: 8 blades seen at the second overtone.
-const MOST_WINDINGS: usize = 16;
+/// Most windings that are tried: a wheel's spokes, or 8 blades seen at the second overtone.
+const MOST_WINDINGS: usize = 20;
 /// Most rings between centre and rim, each with a phase of its own (swept blades), for each polarity.
 const RINGS: usize = 4;
 const BANKS: usize = 2 * RINGS;

@@ -6,6 +6,7 @@ use crate::rotors::extraction::{Extraction, View};
 use crate::rotors::{Disc, Visits};
 use crate::settings::Poll;
 use crate::speed::measurement::{Measurement, Outcome, Stated};
+use crate::tracker::Known;
 
 impl Tachometer<'_> {
     /// Starts measuring the window over the oldest segments.
@@ -73,8 +74,10 @@ impl Tachometer<'_> {
                 let Scratch::Search(scratch) = self.scratch else { return true };
                 if extraction.step(&mut view, self.polar, self.spectrum, scratch) {
                     self.in_step_hz = extraction.in_step_hz();
-                    for candidate in extraction.candidates() {
-                        self.candidates.push(Suspect { found: *candidate, followed: None }).ok();
+                    // What a search missed this time comes last, where nothing else was measured in its place.
+                    let suspected = self.tracker.known().iter().filter_map(Known::suspected);
+                    for found in extraction.candidates().iter().copied().chain(suspected) {
+                        self.candidates.push(Suspect { found, followed: None }).ok();
                     }
                     self.measure_next(0);
                 }

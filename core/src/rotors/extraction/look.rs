@@ -1,12 +1,11 @@
 //! A look at what keeps step with a line: which rotation explains it.
 
 use super::{Extraction, For, Scratch, Stage, View};
-use crate::limits::{COHERENCE_CELLS, WINDING_PHASORS};
+use crate::limits::WINDING_PHASORS;
 use crate::math::{TAU, TurnRate, sqrt};
 use crate::rotors::belief::{LEAST_PHASORS, believe, inside};
-use crate::rotors::coherence::Phasor;
+use crate::rotors::coherence::{LocalGrid, Phasor};
 use crate::rotors::disc::{Disc, Sifted, Sifting};
-use crate::rotors::heat::CellGrid;
 use crate::rotors::kmeans::{KMeans, nearest};
 use crate::store::{Even, StoredEvent};
 
@@ -100,7 +99,7 @@ impl Extraction {
         let share = sqrt(TAU * EVENTS_A_PHASE / self.events.max(1) as f32);
         let cell_px = disc.radius_px * share.min(MOST_CELL_SHARE);
         let half_px = LOCAL_SHARE * disc.radius_px + self.grid.cell_px();
-        self.local = CellGrid::around(disc.x_px, disc.y_px, half_px, cell_px, COHERENCE_CELLS);
+        self.local = LocalGrid::around(disc.x_px, disc.y_px, half_px, cell_px);
         scratch.coherence.clear();
         self.even = Even::default();
         self.stage = Stage::Fill;

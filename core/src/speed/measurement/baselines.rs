@@ -1,7 +1,8 @@
 //! Registration at ever longer baselines: refinement, lock, and the test that tells an alias.
 
-use super::super::baseline::{Effort, Pace, Pairs};
-use super::{COARSE_AGREEMENT, Measurement, Stage};
+use super::super::baseline::{Effort, Estimate, Pace, Pairs};
+use super::coarse::COARSE_AGREEMENT;
+use super::{Measurement, Stage};
 use crate::limits::SLICE_POINTS;
 use crate::reading::Reason;
 use crate::registration::Icp;
@@ -25,6 +26,8 @@ const FOLLOWING: Effort = Effort { pairs: 3, points: SLICE_POINTS / 2, ..LOCK };
 const PAIR_EVENTS: usize = 1_536;
 /// Step of the refinement in symmetry periods (paper: eta x half an angle of symmetry, eta = 0.8).
 pub(super) const REFINEMENT_PERIODS: f32 = 0.4;
+/// Standard errors of the refinement by which it contradicts a harmonic in doubt.
+const REFINED_SIGMAS: f32 = 4.0;
 /// Part of a symmetry period that the fractional-baseline test stops short by.
 pub(super) const FRACTION: f32 = 0.35;
 /// Baseline of the lock as a share of the window.
@@ -71,9 +74,7 @@ impl Measurement {
         };
         self.evidence.refined_rad_s = Some(refined.omega_rad_s);
         self.evidence.refined_sigma_rad_s = Some(refined.sigma_rad_s);
-        if (refined.omega_rad_s - self.omega_rad_s).abs()
-            > COARSE_AGREEMENT * self.omega_rad_s.abs()
-        {
+        if self.contradicts(refined) {
             if self.registers() {
                 return self.refuse(Reason::Ambiguous);
             }
@@ -85,6 +86,16 @@ impl Measurement {
             pairs.retarget(refined.omega_rad_s);
         }
         self.stage = Stage::Further;
+    }
+
+    /// Whether a registration within a part of a period gives another speed than the harmonic: by more than the first coarse witness
+    /// may be off; or, where the harmonic is in doubt, by what a neighbour of it would show, and by more than its own scatter.
+    fn contradicts(&self, refined: Estimate) -> bool {
+        let whole = self.omega_rad_s.abs();
+        let off = (refined.omega_rad_s - self.omega_rad_s).abs();
+        let neighbour = 0.5 * whole / (self.windings as f32 + 1.0);
+        off > COARSE_AGREEMENT * whole
+            || self.doubted() && off > neighbour.max(REFINED_SIGMAS * refined.sigma_rad_s)
     }
 
     /// The paper's further refinement, kept to show what it gains.

@@ -19,6 +19,8 @@ const LEAST_BLUR: (f32, f32) = (0.06, 1.3);
 const MOST_JITTER_S: f32 = 150e-6;
 /// Scatter of a phase by that jitter beyond which a registration is not believed where it contradicts.
 const MOST_SCATTER_RAD: f32 = 0.8;
+/// The same beyond which it leaves no edge: half an octave past the harmonic that it shows best.
+const NO_EDGE_RAD: f32 = 1.41;
 /// Blur that a jitter of one pixel makes as the pose measures it, where the harmonic rises by doubling: up to half an octave
 /// past the best, where 1 / (m exp(-m^2 / 2)) is 1.9.
 const BLUR_OF_JITTER: f32 = 1.9;
@@ -132,8 +134,12 @@ impl Measurement {
     /// Whether jitter may scatter the blades' edges over so much of their distance that a registration matches noise: no overtone is
     /// left of them. Then the phase alone tells, by all events of the window.
     pub(super) fn registers(&self) -> bool {
-        let scatter_rad = self.harmonic as f32 * self.omega_rad_s.abs() * MOST_JITTER_S;
-        scatter_rad < MOST_SCATTER_RAD || self.pose.has_overtone() || self.doubted()
+        self.scatter_rad() < MOST_SCATTER_RAD || self.pose.has_overtone() || self.doubted()
+    }
+
+    /// By how much the jitter of dim light scatters the phase that is followed: sigma scatters a phase of m w t by m w sigma.
+    fn scatter_rad(&self) -> f32 {
+        self.harmonic as f32 * self.omega_rad_s.abs() * MOST_JITTER_S
     }
 
     /// Whether the rotor is also where it should be between whole periods, where an alias is not.
@@ -145,9 +151,9 @@ impl Measurement {
         self.evidence.fractional_deviation.is_some_and(|d| d * (parts as f32) < most)
     }
 
-    /// Share of the events that a rotor of this speed keeps in step at least: jitter of sigma scatters a phase of m w t by m w sigma.
+    /// Share of the events that a rotor of this speed keeps in step at least.
     pub(super) fn least_coherence(&self) -> f32 {
-        let scatter_rad = self.harmonic as f32 * self.omega_rad_s * MOST_JITTER_S;
+        let scatter_rad = self.scatter_rad();
         // exp(-x^2 / 2) to a few percent, and never zero.
         let kept = 1.0 / (1.0 + 0.25 * scatter_rad * scatter_rad);
         LEAST_COHERENCE * kept * kept
@@ -159,14 +165,19 @@ impl Measurement {
         if self.in_doubt() {
             return false;
         }
-        self.edges_px() < self.blur_px(MOST_BLUR)
+        self.too_fast_for_edges() || self.edges_px() < self.blur_px(MOST_BLUR)
+    }
+
+    /// Whether so many events keep step as do at this speed, which was asked before, and no more is to be seen.
+    fn too_fast_for_edges(&self) -> bool {
+        self.scatter_rad() > NO_EDGE_RAD && !self.doubted()
     }
 
     /// Whether the edges are so sharp that a registration that went astray does not count against them. Noise, which leads it
     /// astray, is no blur where no other harmonic keeps step.
     pub(super) fn sharp(&self) -> bool {
         let blur_px = if self.doubted() { self.pose.sharpness_px() } else { self.edges_px() };
-        blur_px < self.blur_px(LEAST_BLUR)
+        self.too_fast_for_edges() || blur_px < self.blur_px(LEAST_BLUR)
     }
 
     /// How sharp the edges are. A single mark is told from its axis's shaking by its sharpness alone, so noise counts against it.

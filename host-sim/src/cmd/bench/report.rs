@@ -34,6 +34,10 @@ pub struct Report {
 impl Report {
     /// Prints in the form that was asked for.
     pub fn print(&self, common: &Common) -> anyhow::Result<()> {
+        if self.tables.is_empty() && self.records.is_empty() {
+            // Nothing was run: a scene was shown.
+            return Ok(());
+        }
         let mut out = std::io::stdout().lock();
         if common.json {
             let seeds = if common.tuning { "tuning" } else { "scored" };
