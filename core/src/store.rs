@@ -155,6 +155,7 @@ impl<'m> Store<'m> {
     }
 
     /// Moves on from the oldest closed segment.
+    #[inline(never)]
     pub fn drop_oldest(&mut self) {
         if self.closed > 0 {
             self.places[..self.ring].rotate_left(1);

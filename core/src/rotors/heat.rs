@@ -162,6 +162,7 @@ impl<'m> HeatMap<'m> {
     }
 
     /// Lets the map fade by one part in `window_segments`, for each of so many segments by which a window slid.
+    #[inline(never)]
     pub fn fade(&mut self, segments: usize, window_segments: u16) {
         for count in self.counts.iter_mut().filter(|count| **count > 0) {
             for _ in 0..segments {

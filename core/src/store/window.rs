@@ -6,6 +6,7 @@ impl Store<'_> {
     /// The window over the oldest `segments` segments (the open one counts as the last when all closed
     /// ones are taken), no longer than to `end_us`.
     #[must_use]
+    #[inline(never)]
     pub fn window(&self, segments: usize, end_us: u64) -> Window<'_> {
         let mut parts: [&[StoredEvent]; MOST_SEGMENTS] = [&[]; MOST_SEGMENTS];
         let segments = segments.min(self.closed + 1);

@@ -140,6 +140,8 @@ impl Tachometer<'_> {
     }
 
     /// Forgets the window; rotors keep their letters.
+    // Not inlined, as other rare things in this module: it stands in flash once.
+    #[inline(never)]
     pub(super) fn restart(&mut self, t_us: u64) {
         self.started = true;
         self.overrun = false;
@@ -188,6 +190,7 @@ impl Tachometer<'_> {
     }
 
     /// Begins to measure the window once it is full, or makes it longer first.
+    #[inline(never)]
     pub(super) fn begin(&mut self) {
         let waits = self.anew_us.is_some();
         while !waits && self.window_segments == 0 && self.store.closed() >= WINDOW_SEGMENTS {

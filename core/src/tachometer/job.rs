@@ -46,6 +46,7 @@ impl Tachometer<'_> {
         self.search_by(Extraction::default());
     }
 
+    #[inline(never)]
     fn search_by(&mut self, extraction: Extraction) {
         self.scratch.ready_for_search();
         self.job = Job::Search(extraction);
