@@ -100,6 +100,8 @@ pub struct Pose {
     harmonic: u32,
     first_harmonic: u32,
     most_harmonic: u32,
+    /// Harmonic whose template was last learnt anew.
+    relearnt: u32,
     /// Parts that have a template of their own.
     sectors: u32,
     walk_px: f32,
@@ -141,6 +143,7 @@ impl Pose {
             harmonic,
             first_harmonic: harmonic,
             most_harmonic: MOST_HARMONIC,
+            relearnt: 0,
             sectors: 1,
             walk_px: if parts > 1 { WALK_PX } else { WALK_SINGLE_PX },
             path: Path::STILL,
@@ -277,7 +280,11 @@ impl Pose {
             && self.phases.is_some()
             && sums.in_step() < SHARP_COHERENCE * at_low;
         if fine && (blurred || apart) && self.harmonic > self.first_harmonic {
-            self.step_back();
+            if blurred || self.relearnt == self.harmonic {
+                self.step_back();
+            } else {
+                self.learn_anew();
+            }
             return false;
         }
         self.sift(sums);
@@ -326,9 +333,15 @@ impl Pose {
         2 * self.harmonic <= self.most_harmonic
     }
 
-    /// The harmonic was raised too far: half of it, learnt anew, and no higher again.
+    /// The harmonic was raised too far: half of it, and no higher again.
     const fn step_back(&mut self) {
         self.harmonic /= 2;
+        self.learn_anew();
+    }
+
+    /// Learns the template of this harmonic anew about the path as it is, and goes no higher again.
+    const fn learn_anew(&mut self) {
+        self.relearnt = self.harmonic;
         self.most_harmonic = self.harmonic;
         self.coherence = self.first_coherence;
         self.phases = None;
