@@ -17,6 +17,8 @@ use crate::rotors::{Disc, Found};
 use crate::store::{Even, Window};
 use doubt::Doubt;
 
+/// Standard errors that an acceleration stands out by.
+const ACCELERATION_SIGMAS: f32 = 4.0;
 /// Relative error of the speed of a rotor that is followed from window to window.
 const FOLLOWING_SIGMA: f32 = 1e-3;
 /// Fewest events of a rotor that are measured.
@@ -257,7 +259,7 @@ impl Measurement {
             self.evidence.phase_sigma_rad_s = Some(found.speed.sigma_rad_s);
             self.drift_px_s = found.drift_px_s;
             self.evidence.sharpness_px = Some(self.pose.sharpness_px());
-            if found.alpha_rad_s2.abs() > 4.0 * found.alpha_sigma_rad_s2 {
+            if found.alpha_rad_s2.abs() > ACCELERATION_SIGMAS * found.alpha_sigma_rad_s2 {
                 self.alpha_rad_s2 = Some(found.alpha_rad_s2);
             }
         }

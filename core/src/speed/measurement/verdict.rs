@@ -2,7 +2,7 @@
 
 use super::super::baseline::Estimate;
 use super::baselines::FRACTION;
-use super::{Measurement, Stated};
+use super::{ACCELERATION_SIGMAS, Measurement, Stated};
 use crate::math::{TAU, sqrt};
 use crate::reading::{Reason, Status};
 use crate::speed::queue::stretch;
@@ -58,6 +58,8 @@ const QUEUE_SIGMA: f32 = 0.5;
 /// Roll of a hand-held camera for each pixel of shift: tremor turns the camera by about one milliradian as
 /// it shifts the image by one pixel.
 const ROLL_RAD_PER_PX: f32 = 1e-3;
+/// Each half of a window holds twice the roll of the whole, so the halves differ by the root of eight of it, half a window apart.
+const ROLL_APART: f32 = 5.7;
 /// Slower wandering of the centre than this in px/s is the measurement's own noise.
 const STILL_PX_S: f32 = 6.0;
 
@@ -110,6 +112,9 @@ impl Measurement {
         } else {
             0.0
         };
+        // What a hand makes of a steady speed is no acceleration.
+        let by_hand = ACCELERATION_SIGMAS * ROLL_APART * roll / window_s;
+        self.alpha_rad_s2 = self.alpha_rad_s2.filter(|alpha| alpha.abs() > by_hand);
         match self.status {
             Status::Coarse => self.widen_coarse(window, held_up / QUEUE_SIGMA, roll),
             Status::Locked if self.pose.in_period() < MARK_BLOCKS => self.widen_mark(),
