@@ -23,6 +23,8 @@ const BANKS: usize = 2 * RINGS;
 const PHASORS_A_RING: usize = 16;
 /// Most that the phase may turn within a cell, in radians: more windings are not told apart.
 const MOST_IN_CELL_RAD: f32 = 2.2;
+/// Phasors that a winding takes to be seen: fewer on a circle fit any number of them.
+const PHASORS_A_WINDING: usize = 3;
 /// Power that the axes and windings that are tried reach by chance, in standard deviations: one in thirty thousand.
 const CHANCE_SIGMAS: f32 = 4.0;
 /// First search: this many steps to each side.
@@ -101,7 +103,8 @@ impl Explainer {
     ) {
         (self.region, self.total) = collect(phasors, inside);
         self.cell_px = Some(cell_px);
-        self.most = ((MOST_IN_CELL_RAD * disc.radius_px / cell_px) as usize).min(MOST_WINDINGS);
+        let told_apart = (MOST_IN_CELL_RAD * disc.radius_px / cell_px) as usize;
+        self.most = told_apart.min(self.region.len() / PHASORS_A_WINDING).min(MOST_WINDINGS);
         self.begin(disc);
     }
 
@@ -287,6 +290,14 @@ mod tests {
                 "{found:?}"
             );
         }
+    }
+
+    #[test]
+    fn few_phasors_show_few_windings() {
+        let many = rotor(16, 60.0);
+        let few: Vec<_> = many.iter().step_by(many.len() / 24).copied().collect();
+        let disc = Disc { x_px: 100.0, y_px: 80.0, radius_px: 60.0 };
+        assert!(explain(&few, disc).windings.unsigned_abs() as usize <= few.len() / 3);
     }
 
     #[test]
