@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Every check, and the tools they need. Continuous integration and people run this very script.
 #
-#   ./ci.sh            all steps, in this order: install format lint test board docs image fuzz deny
+#   ./ci.sh            all steps, in this order: install format lint test board docs image budget fuzz deny
 #   ./ci.sh STEP...    only these
 #
 # Not more than half an hour on two cores from nothing; a few minutes when built before.
@@ -89,6 +89,16 @@ step_image() {
   cargo fw
 }
 
+# Instructions, counted in QEMU, and memory: both fail past what is asked.
+step_budget() {
+  if ! command -v qemu-system-arm >/dev/null; then
+    echo "skipped: no qemu-system-arm"
+    return
+  fi
+  cargo run --release -p evtach-host --bin evtach -- bench cost
+  cargo run --release -p evtach-host --bin evtach -- bench budget
+}
+
 # A smoke run over the seeds, without cargo-fuzz and its instrumentation; fuzz/run.sh is the real thing.
 step_fuzz() {
   if ! rustup toolchain list | grep -q '^nightly'; then
@@ -127,10 +137,10 @@ step_deny() {
 }
 
 steps=("$@")
-[ ${#steps[@]} -gt 0 ] || steps=(install format lint test board docs image fuzz deny)
+[ ${#steps[@]} -gt 0 ] || steps=(install format lint test board docs image budget fuzz deny)
 for step in "${steps[@]}"; do
   if ! declare -F "step_$step" >/dev/null; then
-    echo "ci.sh: no step \"$step\": choose from install format lint test board docs image fuzz deny"
+    echo "ci.sh: no step \"$step\": choose from install format lint test board docs image budget fuzz deny"
     exit 2
   fi
 done

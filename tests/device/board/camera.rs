@@ -206,7 +206,8 @@ fn a_camera_that_rolls_tells_the_speed_in_the_room() {
             duration_ms: 510.0,
             ..Scene::default()
         };
-        scene.sensor.noise_hz = 0.05;
+        // A quick search: the reading is told before the silence behind the window is.
+        scene.sensor.noise_hz = 0.0;
         scene.camera.roll_rad_s = ROLL_RAD_S.into();
         // The hand that rolls it moves it as well, so that the gyro is the better witness.
         scene.camera.drift_px_s = [30.0, -10.0];
