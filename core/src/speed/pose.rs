@@ -13,6 +13,7 @@
 mod blocks;
 mod schedule;
 mod template;
+mod tilt;
 
 use heapless::Vec;
 
@@ -31,6 +32,8 @@ use blocks::{
 };
 use schedule::{Phase, Schedule};
 use template::{BANKS, Counts, RINGS, Template};
+pub use tilt::Tilt;
+use tilt::TiltSums;
 
 /// Events that a block should hold.
 const BLOCK_EVENTS: usize = 32;
@@ -70,6 +73,7 @@ pub struct Sums {
     /// At the harmonic that is followed, and at twice it.
     low: Template,
     high: Template,
+    tilt: TiltSums,
 }
 
 impl Sums {
@@ -79,6 +83,7 @@ impl Sums {
         counts: [0; BANKS],
         low: Template::EMPTY,
         high: Template::EMPTY,
+        tilt: TiltSums::EMPTY,
     };
 
     /// Share of the events in step with the template of the round before.
@@ -105,6 +110,9 @@ pub struct Pose {
     /// Parts that have a template of their own.
     sectors: u32,
     walk_px: f32,
+    tilt: Tilt,
+    /// Whether the tilt is asked for.
+    tilts: bool,
     path: Path,
     /// Blocks in a symmetry period, 0 when blocks are whole periods.
     in_period: usize,
@@ -146,6 +154,8 @@ impl Pose {
             relearnt: 0,
             sectors: 1,
             walk_px: if parts > 1 { WALK_PX } else { WALK_SINGLE_PX },
+            tilt: Tilt::NONE,
+            tilts: false,
             path: Path::STILL,
             in_period: 0,
             phases: None,
@@ -175,6 +185,21 @@ impl Pose {
             self.walk_px = WALK_PX;
         }
         self
+    }
+
+    /// The same for a rotor that may be tilted, as far as it is known. With less than three blades a tilt and an uneven turn look
+    /// alike, and in doubt a neighbour of the harmonic may look like a tilt.
+    #[must_use]
+    pub const fn tilted(mut self, tilt: Tilt) -> Self {
+        self.tilt = tilt;
+        self.tilts = true;
+        self
+    }
+
+    /// How the rotor is tilted, if that was asked.
+    #[must_use]
+    pub fn tilt(&self) -> Option<Tilt> {
+        self.tilts.then_some(self.tilt)
     }
 
     /// Angular harmonic that was followed at last.
@@ -312,6 +337,10 @@ impl Pose {
                 radius_px: self.disc.radius_px,
             };
             moved_px = correct(&mut self.path, &sums.blocks, walk).unwrap_or(f32::MAX);
+            if self.asks_tilt() {
+                let share = self.coherence.max(LEAST_SHARE);
+                self.tilt.correct(&sums.tilt, share, self.harmonic as f32);
+            }
         }
         let at_high = sums.high.coherence(&sums.counts);
         let worth = at_high > at_low
@@ -327,6 +356,11 @@ impl Pose {
             self.divide();
         }
         false
+    }
+
+    /// A sample of the events tells it well enough.
+    fn asks_tilt(&self) -> bool {
+        self.tilts && self.schedule.phase() < Phase::All
     }
 
     const fn may_double(&self) -> bool {
@@ -377,12 +411,14 @@ impl Pose {
         let rings = (RINGS / self.sectors as usize).max(1);
         let rings_per_px = rings as f32 / self.disc.radius_px.max(1.0);
         let doubles = self.may_double();
+        let tilts = self.asks_tilt();
         let mut seen = Vec::new();
         for event in window.segment(self.segment).iter().step_by(stride) {
             let t_us = disc.since_middle_us(*event);
             let (index, f) = self.path.place(t_us as f32);
             let knot = self.path.between((index, f));
-            let Some((x_px, y_px, r2)) = disc.place_by(*event, knot) else { continue };
+            let Some((x_px, y_px, _)) = disc.place_by(*event, knot) else { continue };
+            let (x_px, y_px, r2) = self.tilt.undone(x_px, y_px);
             let turn = Turn::from_rad(knot.turn_rad).plus(rate.after(t_us));
             let angle = Turn::of_vector(y_px, x_px).minus(turn);
             let (s, c) = angle.times(self.harmonic).sin_cos();
@@ -400,6 +436,9 @@ impl Pose {
             let per_r2 = 1.0 / r2;
             let (x, y) = (-y_px * per_r2, x_px * per_r2);
             let (sin_psi, cos_psi) = off;
+            if tilts {
+                sums.tilt.add((x_px, y_px), per_r2, sin_psi);
+            }
             let t_us = t_us as f32;
             seen.push(Seen { block: index, x, y, sin_psi, cos_psi, t_us, f }).ok();
             if seen.is_full() {

@@ -17,7 +17,7 @@ const LEAST_COHERENCE: f32 = 0.3;
 const MOST_BLUR: (f32, f32) = (0.1, 1.5);
 const LEAST_BLUR: (f32, f32) = (0.06, 1.3);
 /// Standard deviation of the events' times in dim light.
-const MOST_JITTER_S: f32 = 150e-6;
+const MOST_JITTER_S: f32 = 200e-6;
 /// Scatter of a phase by that jitter beyond which a registration is not believed where it contradicts.
 const MOST_SCATTER_RAD: f32 = 0.8;
 /// The same beyond which it leaves no edge: half an octave past the harmonic that it shows best.
