@@ -49,6 +49,8 @@ const FOLDED_PERIODS: usize = 3;
 const MOST_HARMONIC: u32 = 96;
 /// A doubled harmonic must keep this share of the events in step that were so at first.
 const SHARP_COHERENCE: f32 = 0.5;
+/// Slower wandering of the axis than this in px/s is the measurement's own noise.
+pub const STILL_PX_S: f32 = 6.0;
 /// Blocks over which the wandering of the axis is judged.
 const DRIFT_BLOCKS: usize = 12;
 
@@ -116,7 +118,7 @@ pub struct Pose {
     path: Path,
     /// Blocks in a symmetry period, 0 when blocks are whole periods.
     in_period: usize,
-    phases: Option<[(f32, f32); BANKS]>,
+    phases: Option<[(f32, f32, f32); BANKS]>,
     coherence: f32,
     /// The same before the harmonic was raised.
     first_coherence: f32,
@@ -335,6 +337,7 @@ impl Pose {
                 coherence: self.coherence,
                 harmonic: self.harmonic,
                 radius_px: self.disc.radius_px,
+                omega_rad_s: self.omega_rad_s,
             };
             moved_px = correct(&mut self.path, &sums.blocks, walk).unwrap_or(f32::MAX);
             if self.asks_tilt() {
@@ -351,7 +354,7 @@ impl Pose {
         if !fine {
             self.first_coherence = self.coherence;
         }
-        self.phases = Some(if sharper { &sums.high } else { &sums.low }.phases());
+        self.phases = Some(if sharper { &sums.high } else { &sums.low }.phases(&sums.counts));
         if self.schedule.advance(if sharper { f32::MAX } else { moved_px }) {
             self.divide();
         }
@@ -431,7 +434,7 @@ impl Pose {
                 sums.high.add(bank, (2.0 * s * c, c * c - s * s));
             }
             let Some(phases) = &self.phases else { continue };
-            let (re, im) = phases[bank];
+            let (re, im, weight) = phases[bank];
             let off = (s * re - c * im, c * re + s * im);
             let per_r2 = 1.0 / r2;
             let (x, y) = (-y_px * per_r2, x_px * per_r2);
@@ -440,7 +443,7 @@ impl Pose {
                 sums.tilt.add((x_px, y_px), per_r2, sin_psi);
             }
             let t_us = t_us as f32;
-            seen.push(Seen { block: index, x, y, sin_psi, cos_psi, t_us, f }).ok();
+            seen.push(Seen { block: index, x, y, sin_psi, cos_psi, t_us, f, weight }).ok();
             if seen.is_full() {
                 blocks::add(&mut sums.blocks, &mut seen);
             }
@@ -462,7 +465,10 @@ impl Pose {
     fn trend(&self, sums: &Sums) -> Option<Slope> {
         let count = self.path.blocks();
         let periods = count / self.in_period.max(1);
-        let fold = if periods >= FOLDED_PERIODS { self.in_period.max(1) } else { 1 };
+        let drift_px_s = self.drift_px_s();
+        // Where the axis wanders, blocks a period apart see other pixels.
+        let folded = periods >= FOLDED_PERIODS && drift_px_s < STILL_PX_S;
+        let fold = if folded { self.in_period.max(1) } else { 1 };
         let half_us = 0.5 * self.window_us;
         let mut points = Vec::<Point, MAX_KNOTS>::new();
         for block in sums.blocks.iter().take(count) {
@@ -481,7 +487,7 @@ impl Pose {
             },
             alpha_rad_s2: trend.bend / (half_s * half_s),
             alpha_sigma_rad_s2: factor * trend.bend_error / (half_s * half_s),
-            drift_px_s: self.drift_px_s(),
+            drift_px_s,
         })
     }
 

@@ -6,6 +6,7 @@ use super::doubt::SMALL_PX;
 use super::{ACCELERATION_SIGMAS, Measurement, Stated};
 use crate::math::{TAU, sqrt};
 use crate::reading::{Reason, Status};
+use crate::speed::pose::STILL_PX_S;
 use crate::speed::queue::stretch;
 use crate::store::Window;
 use crate::tachometer::BASE_WINDOW_US;
@@ -56,13 +57,13 @@ const MARK_BLOCKS: usize = 4;
 const BIAS_RAD: f32 = 5e-3;
 /// Standard deviation of the error by a busy readout, as a share of how far its queue may stretch the window.
 const QUEUE_SIGMA: f32 = 0.5;
-/// Roll of a hand-held camera for each pixel of shift: tremor turns the camera by about one milliradian as
-/// it shifts the image by one pixel.
-const ROLL_RAD_PER_PX: f32 = 1e-3;
+/// Roll of a hand-held camera for each pixel of shift, which has two directions where roll has one: tremor turns the camera by about
+/// one milliradian as it shifts the image by one pixel along either.
+const ROLL_RAD_PER_PX: f32 = 1e-3 / core::f32::consts::SQRT_2;
+/// Window over which the mean roll rate of a tremor of 1 to 12 Hz, from which longer ones keep the less, is what it is at an instant.
+const ROLL_LASTS_S: f32 = 0.067;
 /// Each half of a window holds twice the roll of the whole, so the halves differ by the root of eight of it, half a window apart.
 const ROLL_APART: f32 = 5.7;
-/// Slower wandering of the centre than this in px/s is the measurement's own noise.
-const STILL_PX_S: f32 = 6.0;
 
 impl Measurement {
     /// Combines the witnesses of the lock, or says why the reading stays coarse.
@@ -272,5 +273,5 @@ fn combine(a: Estimate, b: Estimate) -> Estimate {
 /// Share of the tremor's roll rate that is left in the mean over a window: tremor swings back and forth at a
 /// few hertz, so a longer window averages more of it.
 fn roll_share(window_s: f32) -> f32 {
-    (0.1 / window_s).min(1.0)
+    (ROLL_LASTS_S / window_s).min(1.0)
 }
