@@ -184,6 +184,9 @@ impl Pose {
     pub const fn unlike(mut self, parts: u8) -> Self {
         if parts > 1 {
             self.sectors = parts as u32;
+        }
+        // Of two that differ, one may be none: then there is a single mark.
+        if parts > 2 {
             self.walk_px = WALK_PX;
         }
         self

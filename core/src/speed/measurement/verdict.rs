@@ -214,7 +214,7 @@ impl Measurement {
     /// The reading of a single mark is as good as its axis holds still, where it is not followed around the turn: what the mark does
     /// and what the camera does look alike.
     fn widen_mark(&mut self) {
-        if self.parts == Some(1) {
+        if self.parts == Some(1) || self.parts == Some(2) && !self.alike {
             let turn_rad = self.evidence.periods.unwrap_or(0.0) * TAU;
             let shake = SHAKE_PX / (self.disc.radius_px * turn_rad) * self.omega_rad_s;
             let own = self.estimate.sigma_rad_s;
