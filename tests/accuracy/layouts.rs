@@ -167,16 +167,14 @@ fn a_tilt_costs_no_precision() {
     let mut scene = Scene { duration_ms: 400.0, ..scene(74, vec![rotor]) };
     scene.clock.error_ppm = Some(0.0);
     let measured = run(&scene, Capacity::Full);
-    // The first reading may have found its rotor before it knew of the tilt.
-    let errors: Vec<f64> = measured
+    let mut errors: Vec<f64> = measured
         .readings
         .iter()
-        .skip(1)
         .filter_map(|reading| rpm(reading.rotors.first()?))
-        .map(|rpm| rpm / measured.truth.rotors[0].rpm_camera_mean_signed - 1.0)
+        .map(|rpm| (rpm / measured.truth.rotors[0].rpm_camera_mean_signed - 1.0).abs())
         .collect();
-    let mean_square = errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64;
-    assert!(errors.len() >= 4 && mean_square.sqrt() < 25e-6, "{errors:?}");
+    errors.sort_by(f64::total_cmp);
+    assert!(errors.len() >= 5 && errors[errors.len() / 2] < 25e-6, "{errors:?}");
 }
 
 #[test]
