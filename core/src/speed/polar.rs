@@ -77,13 +77,33 @@ impl PolarEvent {
         self.radius_polarity & 0x8000 != 0
     }
 
-    /// Converts one event; `mid_us` is the middle of the window since its start.
-    fn new(event: StoredEvent, place: (f32, f32, f32), start_us: u64, mid_us: i32) -> Self {
-        let (dx, dy, r2) = place;
+    /// The same event as seen from (x, y) pixels beside the centre.
+    #[must_use]
+    pub fn seen_from(self, x_px: f32, y_px: f32) -> Self {
+        let (sin, cos) = self.angle().sin_cos();
+        let (dx, dy) = (self.radius_px() * cos - x_px, self.radius_px() * sin - y_px);
+        let polarity = self.radius_polarity & 0x8000;
+        Self::at((dx, dy, dx * dx + dy * dy), polarity, self.t_us)
+    }
+
+    /// Whether it lies in the annulus of a disc about the centre that it is seen from.
+    #[must_use]
+    pub fn is_in_annulus(self, disc: Disc) -> bool {
+        let Annulus { inner2, outer2, .. } = Annulus::of(disc);
+        let r2 = self.radius_px() * self.radius_px();
+        r2 >= inner2 && r2 <= outer2
+    }
+
+    fn at((dx, dy, r2): (f32, f32, f32), polarity: u16, t_us: i32) -> Self {
         let angle = (Turn::of_vector(dy, dx).0 >> 16) as u16;
         let radius = ((quick_sqrt(r2) * 16.0) as u16).min(0x7FFF);
+        Self { t_us, angle, radius_polarity: radius | polarity }
+    }
+
+    /// Converts one event; `mid_us` is the middle of the window since its start.
+    fn new(event: StoredEvent, place: (f32, f32, f32), start_us: u64, mid_us: i32) -> Self {
         let polarity = if event.is_on() { 0x8000 } else { 0 };
-        Self { t_us: event.since(start_us) - mid_us, angle, radius_polarity: radius | polarity }
+        Self::at(place, polarity, event.since(start_us) - mid_us)
     }
 }
 
