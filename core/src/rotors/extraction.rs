@@ -122,6 +122,8 @@ pub struct Extraction {
     sifting: Sifting,
     /// The collection of visits, once it has begun.
     filling: Option<Filling>,
+    /// The last one, with which the same can be placed in larger cells.
+    filled: Option<Filling>,
     /// Neighbours to each side that a cell of the map is judged with.
     reach: usize,
     /// The disc that is looked at and why, its events, and how far it has got.
