@@ -42,6 +42,11 @@ impl Annulus {
     pub fn place_from(&self, event: StoredEvent, shift_px: (f32, f32)) -> Option<(f32, f32, f32)> {
         let dx = f32::from(event.x()) - self.x_px - shift_px.0;
         let dy = f32::from(event.y()) - self.y_px - shift_px.1;
+        self.within(dx, dy)
+    }
+
+    /// A position relative to the centre, and its squared length, when it lies in the annulus.
+    fn within(&self, dx: f32, dy: f32) -> Option<(f32, f32, f32)> {
         let r2 = dx * dx + dy * dy;
         (r2 >= self.inner2 && r2 <= self.outer2).then_some((dx, dy, r2))
     }
@@ -77,21 +82,13 @@ impl PolarEvent {
         self.radius_polarity & 0x8000 != 0
     }
 
-    /// The same event as seen from (x, y) pixels beside the centre.
+    /// The same event as seen from (x, y) pixels beside the centre, where it lies in an annulus about that place.
     #[must_use]
-    pub fn seen_from(self, x_px: f32, y_px: f32) -> Self {
+    pub fn seen_from(self, x_px: f32, y_px: f32, annulus: &Annulus) -> Option<Self> {
         let (sin, cos) = self.angle().sin_cos();
         let (dx, dy) = (self.radius_px() * cos - x_px, self.radius_px() * sin - y_px);
-        let polarity = self.radius_polarity & 0x8000;
-        Self::at((dx, dy, dx * dx + dy * dy), polarity, self.t_us)
-    }
-
-    /// Whether it lies in the annulus of a disc about the centre that it is seen from.
-    #[must_use]
-    pub fn is_in_annulus(self, disc: Disc) -> bool {
-        let Annulus { inner2, outer2, .. } = Annulus::of(disc);
-        let r2 = self.radius_px() * self.radius_px();
-        r2 >= inner2 && r2 <= outer2
+        let place = annulus.within(dx, dy)?;
+        Some(Self::at(place, self.radius_polarity & 0x8000, self.t_us))
     }
 
     fn at((dx, dy, r2): (f32, f32, f32), polarity: u16, t_us: i32) -> Self {

@@ -5,15 +5,17 @@
 //! harmonic, by a moment in the middle of the window, and the best of all places is believed.
 
 use super::{Measurement, Stage};
-use crate::math::TAU;
+use crate::math::{TAU, larger};
 use crate::rotors::Disc;
 use crate::speed::angular::AngularSums;
 use crate::speed::phase::{harmonics, scan};
-use crate::speed::polar::{PolarTrack, track};
+use crate::speed::polar::{Annulus, PolarTrack, track};
 use crate::store::{Even, Window};
 
 /// Share in step of the second best harmonic over that of the best from which on they are in doubt.
 pub(super) const DOUBTFUL: f32 = 0.3;
+/// The same where a centre that is off by little leads to another harmonic, which then shows as well.
+const SMALL_DOUBTFUL: f32 = 0.15;
 /// The same after the look about the centre, from which on nothing but edges tells them apart.
 const IN_DOUBT: f32 = 0.6;
 /// The same of another harmonic at its own best place, from which on not even edges do.
@@ -85,11 +87,7 @@ impl Doubt {
             if track(window, around, polar, even) {
                 *even = Even::EMPTY;
                 // While a hand moves the axis by little, where that tells one harmonic from the next.
-                if self.small {
-                    keep_middle(polar)
-                } else {
-                    keep_evenly(polar)
-                }
+                keep(polar, self.small);
                 self.collected = true;
             }
             return false;
@@ -118,11 +116,10 @@ impl Doubt {
     fn ask(&mut self, place: Disc, polar: &mut PolarTrack, angular: &mut AngularSums) {
         let (dx_px, dy_px) = (place.x_px - self.disc.x_px, place.y_px - self.disc.y_px);
         // What is seen from there goes behind what is seen from the centre.
-        let collected = polar.len();
+        let (collected, annulus) = (polar.len(), Annulus::of(place));
         for index in 0..collected {
             let Some(event) = polar.get(index) else { break };
-            let event = event.seen_from(dx_px, dy_px);
-            if event.is_in_annulus(place) {
+            if let Some(event) = event.seen_from(dx_px, dy_px, &annulus) {
                 polar.push(event).ok();
             }
         }
@@ -130,18 +127,16 @@ impl Doubt {
         scan(angular, polar.get(collected..).unwrap_or(&[]), place, self.line_hz);
         polar.truncate(collected);
         let found = harmonics(angular);
+        let mut less = (found.share, found.best);
+        if found.share > self.share {
+            less = (self.share, self.best.1);
+            self.share = found.share;
+            self.best = (place, found.best);
+        }
         // Whoever is not the best is its rival.
-        if found.share <= self.share {
-            if found.best != self.best.1 {
-                self.rival_share = self.rival_share.max(found.share);
-            }
-            return;
+        if less.1 != self.best.1 {
+            self.rival_share = larger(self.rival_share, less.0);
         }
-        if found.best != self.best.1 {
-            self.rival_share = self.rival_share.max(self.share);
-        }
-        self.share = found.share;
-        self.best = (place, found.best);
     }
 }
 
@@ -150,23 +145,15 @@ fn is_small(disc: Disc, harmonic: u32) -> bool {
     disc.radius_px < OFF_CENTRE_PX * harmonic as f32
 }
 
-/// Keeps events of all of the window.
-fn keep_evenly(polar: &mut PolarTrack) {
-    let stride = polar.len().div_ceil(MOST_EVENTS).max(1);
-    let mut index = 0;
-    polar.retain(|_| {
-        index += 1;
-        index % stride == 0
-    });
-}
-
-/// Keeps the events of the middle of the window, while the axis is at one place.
-fn keep_middle(polar: &mut PolarTrack) {
+/// Keeps so many events, of all of the window or of its middle.
+fn keep(polar: &mut PolarTrack, middle: bool) {
     let spare = polar.len().saturating_sub(MOST_EVENTS);
+    let (before, stride) =
+        if middle { (spare / 2, 1) } else { (0, polar.len().div_ceil(MOST_EVENTS).max(1)) };
     let mut index = 0;
     polar.retain(|_| {
         index += 1;
-        index > spare / 2
+        index > before && index % stride == 0
     });
     polar.truncate(MOST_EVENTS);
 }
@@ -179,9 +166,10 @@ impl Measurement {
         !settled && (self.standing() > IN_DOUBT || self.doubt.as_ref().is_some_and(rivalled))
     }
 
-    /// Whether the centre is to be looked about: another harmonic keeps step, or would about a centre that is off by little.
+    /// Whether the centre is to be looked about, as another harmonic keeps step too.
     pub(super) fn is_to_be_doubted(&self, rival: f32) -> bool {
-        self.doubt.is_none() && (rival > DOUBTFUL || is_small(self.disc, self.harmonic))
+        let doubtful = if is_small(self.disc, self.harmonic) { SMALL_DOUBTFUL } else { DOUBTFUL };
+        self.doubt.is_none() && rival > doubtful
     }
 
     /// Whether there is any doubt: too much where no lock tells a harmonic from its neighbour.
