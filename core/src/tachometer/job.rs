@@ -26,7 +26,7 @@ impl Tachometer<'_> {
             self.candidates.push(Suspect { found: known.found, followed }).ok();
         }
         if self.until_search == 0 || self.candidates.is_empty() {
-            self.search();
+            self.search_anew();
             return;
         }
         for found in self.tracker.known().iter().filter_map(Known::told) {
@@ -35,33 +35,31 @@ impl Tachometer<'_> {
         let beside = self.rhythm.searches_beside(self.until_search);
         self.until_search -= 1;
         if beside {
-            let known = self.candidates.iter().map(|known| known.found.disc);
-            let beside = Extraction::beside(known);
-            self.search_by(beside);
+            self.search();
         } else {
             self.measure_next(0);
         }
     }
 
-    /// Searches the whole image.
-    fn search(&mut self) {
+    /// Searches the image outside of what was measured in this window.
+    fn search_anew(&mut self) {
         self.until_search = self.rhythm.search_every;
         self.candidates.clear();
-        self.search_by(Extraction::default());
+        self.search();
     }
 
-    /// Searches the image outside of what was measured.
-    fn search_beside_measured(&mut self) {
-        self.until_search = self.rhythm.search_every;
-        self.candidates.clear();
-        let measured = self.outcomes.iter().filter(|o| o.status.reason().is_none());
-        let beside = Extraction::beside(measured.map(|outcome| outcome.found.disc));
-        self.search_by(beside);
-    }
-
+    /// Searches the image outside of what was measured, or is going to be.
+    // Not inlined: it is called in three places.
     #[inline(never)]
-    fn search_by(&mut self, extraction: Extraction) {
+    fn search(&mut self) {
         self.scratch.ready_for_search();
+        let mut extraction = Extraction::default();
+        for known in &self.candidates {
+            extraction.leave_out(known.found.disc);
+        }
+        for measured in self.outcomes.iter().filter(|o| o.status.reason().is_none()) {
+            extraction.leave_out(measured.found.disc);
+        }
         self.job = Job::Search(extraction);
     }
 
@@ -157,7 +155,7 @@ impl Tachometer<'_> {
         let Some(next) = next else {
             if core::mem::take(&mut self.lost) {
                 // What was lost is looked for in this very window, outside of what was not.
-                self.search_beside_measured();
+                self.search_anew();
             } else {
                 self.job = Job::Idle;
             }
