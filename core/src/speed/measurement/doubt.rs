@@ -32,8 +32,9 @@ const FINE_PLACES: i8 = 1;
 const FINE_SPACING: f32 = 0.05;
 /// What is collected about the centre, in radii, so that a place at the corner has its events too.
 const COLLECTED: f32 = 1.3;
-/// Events that a place is judged by.
-const MOST_EVENTS: usize = 512;
+/// Events that are collected, of which about half are seen from a place; and those of a moment.
+const MOST_EVENTS: usize = 1_024;
+const MOMENT_EVENTS: usize = 512;
 
 /// The look about the centre, place by place.
 #[derive(Clone, Copy, Debug)]
@@ -145,17 +146,19 @@ fn is_small(disc: Disc, harmonic: u32) -> bool {
     disc.radius_px < OFF_CENTRE_PX * harmonic as f32
 }
 
-/// Keeps so many events, of all of the window or of its middle.
-fn keep(polar: &mut PolarTrack, middle: bool) {
-    let spare = polar.len().saturating_sub(MOST_EVENTS);
-    let (before, stride) =
-        if middle { (spare / 2, 1) } else { (0, polar.len().div_ceil(MOST_EVENTS).max(1)) };
+/// Keeps events of all of the window, or of a moment in its middle.
+fn keep(polar: &mut PolarTrack, moment: bool) {
+    let (before, stride) = if moment {
+        (polar.len().saturating_sub(MOMENT_EVENTS) / 2, 1)
+    } else {
+        (0, polar.len().div_ceil(MOST_EVENTS).max(1))
+    };
     let mut index = 0;
     polar.retain(|_| {
         index += 1;
         index > before && index % stride == 0
     });
-    polar.truncate(MOST_EVENTS);
+    polar.truncate(if moment { MOMENT_EVENTS } else { MOST_EVENTS });
 }
 
 impl Measurement {
