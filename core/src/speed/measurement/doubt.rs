@@ -24,7 +24,7 @@ const MOST_RIVAL: f32 = 0.9;
 pub(super) const SMALL_PX: f32 = 20.0;
 /// Pixels that a hand may move the axis by within a window. About a centre that is off by R / m, a harmonic m looks like its
 /// neighbour on one side of the rotor.
-const OFF_CENTRE_PX: f32 = 3.0;
+const OFF_CENTRE_PX: f32 = 4.0;
 /// Places to each side of the centre, and how far they are apart in radii; then the same about the best of them.
 const PLACES: i8 = 3;
 const SPACING: f32 = 0.1;
@@ -43,6 +43,8 @@ pub(super) struct Doubt {
     line_hz: f32,
     /// Whether a centre that is off by little leads to another harmonic.
     small: bool,
+    /// Whether this is the second look, about the best place of the first, which lay at its border.
+    again: bool,
     /// Whether the events are collected.
     collected: bool,
     /// Centre of the places, how far they are apart, and how many there are to each side.
@@ -63,6 +65,7 @@ impl Doubt {
             disc,
             line_hz,
             small: is_small(disc, harmonic),
+            again: false,
             collected: false,
             from: disc,
             spacing_px: SPACING * disc.radius_px,
@@ -106,7 +109,15 @@ impl Doubt {
             return false;
         }
         let last = self.places == FINE_PLACES;
-        self.from = self.best.0;
+        let (best, harmonic) = self.best;
+        let border_px = (f32::from(PLACES) - 0.5) * self.spacing_px;
+        let off_px = larger((best.x_px - self.from.x_px).abs(), (best.y_px - self.from.y_px).abs());
+        if !last && !self.again && off_px > border_px {
+            // What lies beyond may be better still.
+            *self = Self { again: true, ..Self::new(best, self.line_hz, harmonic.unsigned_abs()) };
+            return false;
+        }
+        self.from = best;
         self.spacing_px = FINE_SPACING * self.disc.radius_px;
         self.places = FINE_PLACES;
         (self.row, self.column) = (-FINE_PLACES, -FINE_PLACES);
