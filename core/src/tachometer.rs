@@ -81,6 +81,8 @@ pub struct Tachometer<'m> {
     candidates: Vec<Suspect, MAX_SUSPECTS>,
     outcomes: Vec<Outcome, MAX_ROTORS>,
     in_step_hz: Option<f32>,
+    /// Whether a rotor that is followed was not locked in this window.
+    lost: bool,
     tracker: Tracker,
     /// Readings until the whole image is searched again.
     until_search: u8,
@@ -129,6 +131,7 @@ impl<'m> Tachometer<'m> {
             candidates: Vec::new(),
             outcomes: Vec::new(),
             in_step_hz: None,
+            lost: false,
             tracker: Tracker::default(),
             until_search: 0,
             stretch: Stretch::default(),

@@ -21,8 +21,8 @@ pub struct Known {
     pub parts: Option<u8>,
     /// Whether the parts are alike.
     pub alike: bool,
-    /// Whether it was locked when last seen.
-    locked: bool,
+    /// How far its measurement got when it was last seen.
+    status: Status,
     /// Readings since it was last seen; 0 = in the last one.
     missed: u8,
 }
@@ -30,16 +30,22 @@ pub struct Known {
 impl Known {
     /// Whether the last reading locked it, so that it can be followed: what was only suspected is not.
     #[must_use]
-    pub const fn can_be_followed(&self) -> bool {
-        self.missed == 0 && self.locked
+    pub fn can_be_followed(&self) -> bool {
+        self.missed == 0 && self.status == Status::Locked
     }
 
-    /// What is measured again where the last reading saw a rotor without locking it, even if a search misses it: by its
-    /// parts, which keep step also where its speed is not known so well yet.
+    /// What is measured afresh where the last reading saw a rotor and this window has none in its place, even if a search misses
+    /// it: by its parts, which keep step also where its speed is not known so well yet.
     #[must_use]
-    pub fn suspected(&self) -> Option<Found> {
+    pub fn afresh(&self) -> Option<Found> {
         let windings = self.parts.map_or(self.found.windings, u32::from);
-        (self.missed == 0 && !self.locked).then_some(Found { windings, ..self.found })
+        (self.missed == 0).then_some(Found { windings, ..self.found })
+    }
+
+    /// What is measured again in the very next window, search or not: a speed that was told must not come and go.
+    #[must_use]
+    pub fn told(&self) -> Option<Found> {
+        self.afresh().filter(|_| self.status == Status::Coarse)
     }
 }
 
@@ -67,7 +73,7 @@ impl Tracker {
     /// The letter of a rotor: that of the nearest known one within half a radius, else the first free.
     pub fn identify(&mut self, outcome: &Outcome) -> u8 {
         let disc = outcome.found.disc;
-        let locked = outcome.status == Status::Locked;
+        let status = outcome.status;
         let near = |known: &Disc| {
             let reach = 0.5 * disc.radius_px.max(known.radius_px);
             disc.distance2(known) < reach * reach
@@ -80,7 +86,7 @@ impl Tracker {
             known.found = outcome.found;
             known.parts = outcome.parts;
             known.alike = outcome.alike;
-            known.locked = locked;
+            known.status = status;
             known.missed = 0;
             return known.id;
         }
@@ -93,7 +99,7 @@ impl Tracker {
             self.known.swap_remove(oldest);
         }
         let (parts, alike) = (outcome.parts, outcome.alike);
-        self.known.push(Known { id, found: outcome.found, parts, alike, locked, missed: 0 }).ok();
+        self.known.push(Known { id, found: outcome.found, parts, alike, status, missed: 0 }).ok();
         id
     }
 }

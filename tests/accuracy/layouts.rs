@@ -4,8 +4,8 @@
 use evtach_core::{Direction, Geometry, Reading, RotorReading, Status};
 use evtach_host::measure::Capacity;
 use evtach_host::synth::presets::{Preset, hand, wall};
-use evtach_host::synth::scene::{Background, Lamp, Sensor, Shape};
-use evtach_host::synth::{Rotor, Scene, Truth, generate};
+use evtach_host::synth::scene::{Background, Camera, Lamp, Sensor, Shape};
+use evtach_host::synth::{Model, Rotor, Scene, Truth, generate};
 use evtach_tests::{Loaded, measure, show};
 
 /// Largest relative error of a speed.
@@ -194,6 +194,42 @@ fn one_locked_while_another_is_refused() {
         .iter()
         .any(|reading| reading.status == Status::Locked && reading.rotors.iter().any(refused));
     assert!(both, "{:?}", measured.readings);
+}
+
+/// A hand moves the axis by as much as tells one harmonic from the next: the right speed, or none.
+#[test]
+fn small_rotors_with_many_blades_in_a_trembling_hand() {
+    let sensor = Sensor {
+        threshold_spread: 0.145,
+        refractory_us: 115.0,
+        latency_spread_us: 15.0,
+        jitter_us: 113.0,
+        noise_hz: 0.38,
+        blur_px: 0.51,
+        dropout: 0.11,
+        ..Sensor::default()
+    };
+    let camera =
+        Camera { tremor_px: 2.5, tremor_mrad: 2.5, drift_px_s: [-2.4, -9.8], ..Camera::default() };
+    let mut wrong = Vec::new();
+    for (radius_px, rpm) in [(13.0, -7016.0), (17.0, -9000.0), (22.0, -9360.0)] {
+        let rotor = Rotor {
+            blades: 8,
+            shape: Shape::Straight,
+            contrast: -1.09,
+            tilt_deg: 20.0,
+            tilt_axis_deg: 107.0,
+            ..at(170.0, 130.0, radius_px, rpm)
+        };
+        let still =
+            Scene { model: Model::Threshold, duration_ms: 205.0, ..scene(506, vec![rotor]) };
+        let scene = Scene { sensor: sensor.clone(), camera: camera.clone(), ..still };
+        for capacity in Capacity::ALL {
+            let name = format!("{radius_px} px, {} memory", capacity.as_str());
+            wrong.extend(run(&scene, capacity).wrong_speeds(&name, false));
+        }
+    }
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
 }
 
 /// More parts than are named: the speed, and no blade count.

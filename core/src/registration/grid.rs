@@ -5,7 +5,7 @@ use crate::limits::{GRID_CELLS_SIDE, SLICE_POINTS};
 use crate::math::larger;
 
 /// Smallest cell in pixels: finer cells would be empty.
-const LEAST_CELL_PX: f32 = 3.5;
+const LEAST_CELL_PX: f32 = 2.0;
 /// More than what rounding makes of the way to the edge of a cell, in pixels.
 const ROUNDING_PX: f32 = 0.01;
 const SIDE: usize = GRID_CELLS_SIDE;

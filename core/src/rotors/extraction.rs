@@ -125,6 +125,8 @@ pub struct Extraction {
     sifting: Sifting,
     /// The collection of visits, once it has begun.
     filling: Option<Filling>,
+    /// The last one, with which the same can be placed in larger cells.
+    filled: Option<Filling>,
     /// Neighbours to each side that a cell of the map is judged with.
     reach: usize,
     /// The disc that is looked at and why, its events, and how far it has got.
@@ -188,9 +190,9 @@ pub struct View<'a> {
 }
 
 impl Extraction {
-    /// A search of what is outside these rotors.
-    pub fn beside(known: impl Iterator<Item = Disc>) -> Self {
-        Self { taken: known.take(MAX_ROTORS).map(covered).collect(), ..Self::default() }
+    /// Searches outside this rotor only.
+    pub fn leave_out(&mut self, known: Disc) {
+        self.taken.push(covered(known)).ok();
     }
 
     /// One bounded piece of work; `true` once [`Self::candidates`] stand.
@@ -279,7 +281,7 @@ impl Extraction {
 
     /// Enters a rotor; the search goes on without what it covers.
     fn take(&mut self, found: Found) {
-        self.taken.push(covered(found.disc)).ok();
+        self.leave_out(found.disc);
         if self.quarter == 0 {
             self.tried.clear();
         }

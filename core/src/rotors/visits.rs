@@ -34,6 +34,8 @@ const LEAST_HEAT: usize = 3;
 const LEAST_CELLS: usize = 16;
 /// Most neighbours to each side.
 const MOST_REACH: usize = 2;
+/// Largest cells, as a power of two of pixels.
+pub const COARSEST_LOG2: u8 = 4;
 /// Longest row of cells: [`Geometry::MAX_PX`] in cells of 4 px.
 const MOST_COLUMNS: usize = Geometry::MAX_PX as usize / 4;
 
@@ -103,15 +105,24 @@ impl Visits {
         self.cell = 0;
         self.chance = Chance::default();
         self.ends.fill(0);
+        self.times.fill(0);
+    }
+
+    /// The cells that the visits are filled into: coarser ones than they were cleared for, where the events wanted these.
+    #[must_use]
+    pub const fn cells(&self) -> CellGrid {
+        self.grid
     }
 
     /// Takes in the events of a segment outside the discs in `taken`, evenly thinned to the capacity; once all are in,
-    /// their number, and with how many of its own polarity an event shares its cell on average.
+    /// their number, and with how many of its own polarity an event shares its cell on average. Cells grow until it shares
+    /// it with `least_company`, as far as counts tell.
     pub fn fill(
         &mut self,
         window: &Window<'_>,
         taken: &[Disc],
         filling: &mut Filling,
+        least_company: f32,
     ) -> Option<(usize, f32)> {
         let (grid, start_us) = (self.grid, window.start_us);
         self.window_us = window.duration_us.max(1);
@@ -135,6 +146,10 @@ impl Visits {
                 if let Some(time) = self.times.get_mut(usize::from(*place)) {
                     *time = (tick << 1) | u16::from(event.is_on());
                 }
+            } else if event.is_on()
+                && let Some(on) = self.times.get_mut(cell)
+            {
+                *on += 1;
             }
             *place += 1;
         };
@@ -144,21 +159,72 @@ impl Visits {
         if *counted {
             return Some(self.filled());
         }
-        // From counts to starts; placing the events turns starts into ends.
+        while self.grid.cell_log2 < COARSEST_LOG2 && self.counted_company() < least_company {
+            self.merge();
+        }
+        self.place_in(filling);
+        None
+    }
+
+    /// Makes ready to place the events in larger cells: they were counted before.
+    pub fn place_in_coarser(&mut self, filling: &mut Filling) {
+        // From ends to counts.
+        let mut start = 0;
+        for end in &mut self.ends {
+            *end -= start;
+            start += *end;
+        }
+        self.merge();
+        self.cell = 0;
+        self.chance = Chance::default();
+        self.place_in(filling);
+    }
+
+    /// From counts to starts; placing the events turns starts into ends.
+    fn place_in(&mut self, filling: &mut Filling) {
         let mut start = 0;
         for end in &mut self.ends {
             let count = *end;
             *end = start;
             start += count;
         }
-        even.again();
-        (*counted, *left) = (true, VISITS);
-        None
+        filling.even.again();
+        (filling.counted, filling.left) = (true, VISITS);
+    }
+
+    /// The company of the events that were counted, of either polarity.
+    fn counted_company(&self) -> f32 {
+        let (mut company, mut events) = (0_u32, 0_u32);
+        for (cell, count) in self.ends.iter().enumerate().take(self.grid.len()) {
+            let count = u32::from(*count);
+            let on = self.times.get(cell).map_or(count / 2, |on| u32::from(*on));
+            let off = count.saturating_sub(on);
+            company += on * on.saturating_sub(1) + off * off.saturating_sub(1);
+            events += count;
+        }
+        company as f32 / events.max(1) as f32
+    }
+
+    /// Adds up the counts of four cells each.
+    fn merge(&mut self) {
+        let coarser = self.grid.coarser();
+        for cell in 0..self.grid.len() {
+            let (column, row) = (cell % self.grid.columns, cell / self.grid.columns);
+            // Never behind the cell at hand, so that nothing is added to what has not been moved yet.
+            let into = row / 2 * coarser.columns + column / 2;
+            let count = core::mem::take(&mut self.ends[cell]);
+            self.ends[into] += count;
+            let on = self.times.get_mut(cell).map_or(0, core::mem::take);
+            if let Some(sum) = self.times.get_mut(into) {
+                *sum += on;
+            }
+        }
+        self.grid = coarser;
     }
 
     /// The number of events, and with how many of its own polarity an event shares its cell on average.
     fn filled(&self) -> (usize, f32) {
-        let company: f32 = (0..VISIT_CELLS)
+        let company: f32 = (0..self.grid.len())
             .map(|cell| {
                 let times = self.of(cell);
                 let on = times.iter().filter(|time| **time & 1 == 1).count() as f32;
@@ -179,11 +245,11 @@ impl Visits {
     /// it has events, up to `most_weight`: 1 for all alike.
     pub fn step(&mut self, lags: &mut [f32; LAGS], most_weight: usize) -> bool {
         let mut pairs = 0;
-        while self.cell < VISIT_CELLS && pairs < PAIRS_A_STEP {
+        while self.cell < self.grid.len() && pairs < PAIRS_A_STEP {
             pairs += 8 + self.pair(self.cell, lags, most_weight);
             self.cell += 1;
         }
-        self.cell >= VISIT_CELLS
+        self.cell >= self.grid.len()
     }
 
     /// Adds the time differences of one cell; returns how many.

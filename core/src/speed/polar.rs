@@ -42,6 +42,11 @@ impl Annulus {
     pub fn place_from(&self, event: StoredEvent, shift_px: (f32, f32)) -> Option<(f32, f32, f32)> {
         let dx = f32::from(event.x()) - self.x_px - shift_px.0;
         let dy = f32::from(event.y()) - self.y_px - shift_px.1;
+        self.within(dx, dy)
+    }
+
+    /// A position relative to the centre, and its squared length, when it lies in the annulus.
+    fn within(&self, dx: f32, dy: f32) -> Option<(f32, f32, f32)> {
         let r2 = dx * dx + dy * dy;
         (r2 >= self.inner2 && r2 <= self.outer2).then_some((dx, dy, r2))
     }
@@ -77,13 +82,25 @@ impl PolarEvent {
         self.radius_polarity & 0x8000 != 0
     }
 
-    /// Converts one event; `mid_us` is the middle of the window since its start.
-    fn new(event: StoredEvent, place: (f32, f32, f32), start_us: u64, mid_us: i32) -> Self {
-        let (dx, dy, r2) = place;
+    /// The same event as seen from (x, y) pixels beside the centre, where it lies in an annulus about that place.
+    #[must_use]
+    pub fn seen_from(self, x_px: f32, y_px: f32, annulus: &Annulus) -> Option<Self> {
+        let (sin, cos) = self.angle().sin_cos();
+        let (dx, dy) = (self.radius_px() * cos - x_px, self.radius_px() * sin - y_px);
+        let place = annulus.within(dx, dy)?;
+        Some(Self::at(place, self.radius_polarity & 0x8000, self.t_us))
+    }
+
+    fn at((dx, dy, r2): (f32, f32, f32), polarity: u16, t_us: i32) -> Self {
         let angle = (Turn::of_vector(dy, dx).0 >> 16) as u16;
         let radius = ((quick_sqrt(r2) * 16.0) as u16).min(0x7FFF);
+        Self { t_us, angle, radius_polarity: radius | polarity }
+    }
+
+    /// Converts one event; `mid_us` is the middle of the window since its start.
+    fn new(event: StoredEvent, place: (f32, f32, f32), start_us: u64, mid_us: i32) -> Self {
         let polarity = if event.is_on() { 0x8000 } else { 0 };
-        Self { t_us: event.since(start_us) - mid_us, angle, radius_polarity: radius | polarity }
+        Self::at(place, polarity, event.since(start_us) - mid_us)
     }
 }
 

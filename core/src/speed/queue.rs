@@ -25,9 +25,11 @@ const MOST_SCATTER: f32 = 0.2;
 /// Events that a readout may hold.
 const QUEUE_EVENTS: f32 = 4_096.0;
 
-/// Events of a pixel for each blade that passes, below which most are lost: a blade leaves one or two, of both polarities, and a
-/// mark on a disc, which passes half of it, half as many.
-const MOST_SEEN: f32 = 0.3;
+/// Share of a rotor's events that come, from which on it is not sure that any are lost.
+const MOST_CAME: f32 = 0.6;
+/// Events that a blade leaves in a pixel as it passes, at least: one or two, of both polarities, and a mark on a disc, which passes
+/// half of it, half as many.
+const LEAST_LEFT: f32 = 0.5;
 /// A line through times of which the first share x is early by the share y of all is tilted by 6 x y at most.
 const TILT: f32 = 6.0;
 
@@ -55,8 +57,10 @@ pub fn stretch(window: &Window<'_>, disc: Disc, periods: Option<f32>) -> f32 {
     }
     let whole = QUEUE_EVENTS / larger(arrived, QUEUE_EVENTS);
     let seen = core::f32::consts::PI * disc.radius_px * disc.radius_px * periods.unwrap_or(0.0);
-    // At least as many are lost as come, so that the queue is full when as many as it holds have come.
-    if of_rotor < MOST_SEEN * seen { (TILT * whole * whole).min(whole) } else { whole }
+    // Of so many that the pixels sent, these came: what is lost beside one that comes fills the queue, or would.
+    let came = of_rotor / larger(LEAST_LEFT * seen, of_rotor);
+    let filled = whole * (came / larger(1.0 - came, f32::MIN_POSITIVE)).min(1.0);
+    if came < MOST_CAME { (TILT * filled * whole).min(whole) } else { whole }
 }
 
 /// Variance of the time that a group takes over that of a Poisson process, times the degrees of freedom, and these.
@@ -141,6 +145,9 @@ mod tests {
         let complete = around(disc, Some(500.0), |_| 1_000);
         assert!((complete / whole - 1.0).abs() < 0.05, "{complete}");
         let lost = around(disc, Some(5_000.0), |_| 1_000);
-        assert!((lost / (6.0 * whole * whole) - 1.0).abs() < 0.1, "{lost}");
+        // 150 000 of 785 000 came, so the queue was full by the time that a quarter of what it holds had come.
+        let came = 150_000.0 / (0.5 * core::f32::consts::PI * 100.0 * 5_000.0);
+        let filled = whole * came / (1.0 - came);
+        assert!((lost / (6.0 * filled * whole) - 1.0).abs() < 0.1, "{lost}");
     }
 }

@@ -19,36 +19,47 @@ impl Tachometer<'_> {
         self.candidates.clear();
         self.outcomes.clear();
         self.in_step_hz = None;
+        self.lost = false;
         let known = self.tracker.known().iter().filter(|known| known.can_be_followed());
         for known in known {
             let followed = Some((known.parts, known.alike));
             self.candidates.push(Suspect { found: known.found, followed }).ok();
         }
         if self.until_search == 0 || self.candidates.is_empty() {
-            self.search();
+            self.search_anew();
             return;
+        }
+        for found in self.tracker.known().iter().filter_map(Known::told) {
+            suspect(&mut self.candidates, found);
         }
         let beside = self.rhythm.searches_beside(self.until_search);
         self.until_search -= 1;
         if beside {
-            let known = self.candidates.iter().map(|known| known.found.disc);
-            let beside = Extraction::beside(known);
-            self.search_by(beside);
+            self.search();
         } else {
             self.measure_next(0);
         }
     }
 
-    /// Searches the whole image.
-    fn search(&mut self) {
+    /// Searches the image outside of what was measured in this window.
+    fn search_anew(&mut self) {
         self.until_search = self.rhythm.search_every;
         self.candidates.clear();
-        self.search_by(Extraction::default());
+        self.search();
     }
 
+    /// Searches the image outside of what was measured, or is going to be.
+    // Not inlined: it is called in three places.
     #[inline(never)]
-    fn search_by(&mut self, extraction: Extraction) {
+    fn search(&mut self) {
         self.scratch.ready_for_search();
+        let mut extraction = Extraction::default();
+        for known in &self.candidates {
+            extraction.leave_out(known.found.disc);
+        }
+        for measured in self.outcomes.iter().filter(|o| o.status.reason().is_none()) {
+            extraction.leave_out(measured.found.disc);
+        }
         self.job = Job::Search(extraction);
     }
 
@@ -81,7 +92,7 @@ impl Tachometer<'_> {
                         suspect(&mut self.candidates, *candidate);
                     }
                     // What a search missed this time comes last, where nothing else was measured in its place.
-                    for found in self.tracker.known().iter().filter_map(Known::suspected) {
+                    for found in self.tracker.known().iter().filter_map(Known::afresh) {
                         suspect(&mut self.candidates, found);
                     }
                     self.measure_next(0);
@@ -100,12 +111,11 @@ impl Tachometer<'_> {
                 let (index, outcome) = (*index, measurement.result());
                 let followed = self.candidates.get(index).is_some_and(|c| c.followed.is_some());
                 if followed && outcome.status != Status::Locked {
-                    // Lost: look at the whole image again, in this very window.
-                    self.outcomes.clear();
-                    self.search();
-                    return false;
+                    // The others are followed all the same.
+                    self.lost = true;
+                } else {
+                    self.keep(outcome);
                 }
-                self.keep(outcome);
                 self.measure_next(index + 1);
                 false
             }
@@ -143,7 +153,12 @@ impl Tachometer<'_> {
         };
         let next = (index..self.candidates.len()).find(|i| !taken(&self.candidates[*i].found.disc));
         let Some(next) = next else {
-            self.job = Job::Idle;
+            if core::mem::take(&mut self.lost) {
+                // What was lost is looked for in this very window, outside of what was not.
+                self.search_anew();
+            } else {
+                self.job = Job::Idle;
+            }
             return;
         };
         self.scratch.ready_for_measuring();
@@ -156,9 +171,11 @@ impl Tachometer<'_> {
     }
 }
 
-/// Enters what is to be measured, while there is room.
-// Not inlined: it is called in two places.
+/// Enters what is to be measured, unless it stands there, while there is room.
+// Not inlined: it is called in three places.
 #[inline(never)]
 fn suspect(suspects: &mut Vec<Suspect, MAX_SUSPECTS>, found: Found) {
-    suspects.push(Suspect { found, followed: None }).ok();
+    if suspects.iter().all(|known| known.found.disc != found.disc) {
+        suspects.push(Suspect { found, followed: None }).ok();
+    }
 }

@@ -5,11 +5,10 @@ use crate::event::Geometry;
 use crate::limits::{MAX_LINES, VISIT_CELLS, VISITS};
 use crate::rotors::heat::CellGrid;
 use crate::rotors::lines::{Line, Spectrum};
-use crate::rotors::visits::Filling;
+use crate::rotors::visits::{COARSEST_LOG2, Filling};
 
-/// Events of its own polarity that an event shares its cell with on average, at least, and the largest cells for that.
+/// Events of its own polarity that an event shares its cell with on average, at least.
 pub(super) const LEAST_COMPANY: f32 = 3.0;
-pub(super) const COARSEST_LOG2: u8 = 4;
 /// In a quarter, the same beyond which finer cells are tried first, and the finest.
 const MUCH_COMPANY: f32 = 6.0;
 const FINEST_LOG2: u8 = 2;
@@ -51,7 +50,8 @@ impl Extraction {
             }
             return self.start_filling(scratch);
         };
-        let filled = scratch.visits.fill(&view.window, &self.taken, filling);
+        let least_company = if self.quarter == 0 { LEAST_COMPANY } else { HOPELESS_COMPANY };
+        let filled = scratch.visits.fill(&view.window, &self.taken, filling, least_company);
         let most_events = filling.most_events();
         if filled.map(|(events, _)| events).or(most_events).is_some_and(|most| most < LEAST_EVENTS)
         {
@@ -59,12 +59,9 @@ impl Extraction {
             return if self.quarter == 0 { self.end() } else { self.next_quarter() };
         }
         let Some((events, company)) = filled else { return };
-        self.filling = None;
+        self.filled = self.filling.take();
+        self.grid = scratch.visits.cells();
         self.lonely = company < LEAST_COMPANY && self.grid.cell_log2 < COARSEST_LOG2;
-        if self.lonely && (self.quarter == 0 || company < HOPELESS_COMPANY) {
-            self.grid = self.grid.coarser();
-            return;
-        }
         let finer = self.quarter > 0 && !self.finer && company > MUCH_COMPANY;
         if finer && self.grid.cell_log2 > FINEST_LOG2 {
             // Many small blades pass side by side.
@@ -94,11 +91,22 @@ impl Extraction {
         }
     }
 
-    pub(super) fn spectrum(&mut self, view: &View<'_>, spectrum: &mut Spectrum, scratch: &Scratch) {
+    pub(super) fn spectrum(
+        &mut self,
+        view: &View<'_>,
+        spectrum: &mut Spectrum,
+        scratch: &mut Scratch,
+    ) {
         self.lines = spectrum.lines(scratch.visits.chance(), view.window.duration_us);
         let too_fine = self.lonely || self.finer && self.grid.cell_log2 < self.least_log2;
-        if self.lines.is_empty() && too_fine {
-            self.grid = self.grid.coarser();
+        if self.lines.is_empty()
+            && too_fine
+            && let Some(mut filling) = self.filled.take()
+        {
+            scratch.visits.place_in_coarser(&mut filling);
+            self.filling = Some(filling);
+            // Finer ones were tried.
+            self.finer = true;
             self.stage = Stage::Visits;
             return;
         }
@@ -113,7 +121,10 @@ impl Extraction {
         let half = |cells: usize| ((cells << view.grid.cell_log2) / 2) as u16;
         let (width_px, height_px) = (half(columns), half(rows));
         let (column, row) = (number % QUARTERS_A_SIDE, number / QUARTERS_A_SIDE);
-        let geometry = Geometry { width_px, height_px };
+        // Whatever their size, cells cover the same.
+        let whole_cells = |px: u16| px.next_multiple_of(1 << COARSEST_LOG2);
+        let geometry =
+            Geometry { width_px: whole_cells(width_px), height_px: whole_cells(height_px) };
         CellGrid {
             x0: width_px / 2 * column as u16,
             y0: height_px / 2 * row as u16,

@@ -1,6 +1,6 @@
 //! What turns too slowly to pass anywhere twice, looked for in the middle of all that moves.
 
-use super::quarters::{COARSEST_LOG2, LEAST_COMPANY};
+use super::quarters::LEAST_COMPANY;
 use super::{Extraction, For, Scratch, Stage, View};
 use crate::rotors::belief::believe;
 use crate::rotors::disc::Disc;
@@ -22,13 +22,11 @@ impl Extraction {
             }
             return self.start_filling(scratch);
         };
-        let filled = scratch.visits.fill(&view.window, &[], filling);
-        let Some((_, company)) = filled else { return };
-        self.filling = None;
-        if company < LEAST_COMPANY && self.grid.cell_log2 < COARSEST_LOG2 {
-            self.grid = self.grid.coarser();
+        if scratch.visits.fill(&view.window, &[], filling, LEAST_COMPANY).is_none() {
             return;
         }
+        self.filling = None;
+        self.grid = scratch.visits.cells();
         self.stage = Stage::Heat;
     }
 

@@ -2,7 +2,7 @@
 //! coarse witness), the angle of symmetry; and after, the initial alignment (second coarse witness).
 
 use super::baselines::{REFINEMENT, REFINEMENT_PERIODS};
-use super::doubt::{DOUBTFUL, Doubt};
+use super::doubt::Doubt;
 use super::{LEAST_EVENTS, Measurement, Stage, Stated};
 use crate::math::TAU;
 use crate::reading::{Reason, Speed, Status};
@@ -103,8 +103,8 @@ impl Measurement {
         if scan.best == 0 {
             return self.refuse(Reason::NoRotation);
         }
-        if rival > DOUBTFUL && self.doubt.is_none() {
-            self.doubt = Some(Doubt::new(self.disc, line_hz));
+        if self.is_to_be_doubted(rival) {
+            self.doubt = Some(Doubt::new(self.disc, line_hz, self.harmonic));
             self.stage = Stage::Doubt;
             return;
         }

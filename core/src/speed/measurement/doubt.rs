@@ -1,45 +1,84 @@
-//! A harmonic in doubt: where the second best keeps step almost as well as the best, the centre is off or the harmonic is
-//! wrong. About a wrong centre a neighbour of the right harmonic fits one side of the rotor, and Newton's steps lead it
-//! there. So each place about the centre is asked for its own best harmonic, and the best of all places is believed.
+//! A harmonic in doubt: where the second best keeps step almost as well as the best, or so many blades stand on so small a
+//! radius that a centre is never known well enough, the centre may be off or the harmonic wrong. About a wrong centre a
+//! neighbour of the right harmonic fits one side of the rotor, and Newton's steps lead it there; while a hand moves the axis
+//! by as much, it may even keep step better than the right one. So each place about the centre is asked for its own best
+//! harmonic, by a moment in the middle of the window, and the best of all places is believed.
 
 use super::{Measurement, Stage};
-use crate::math::TAU;
+use crate::math::{TAU, larger};
 use crate::rotors::Disc;
 use crate::speed::angular::AngularSums;
 use crate::speed::phase::{harmonics, scan};
-use crate::speed::polar::{PolarTrack, track};
+use crate::speed::polar::{Annulus, PolarTrack, track};
 use crate::store::{Even, Window};
 
 /// Share in step of the second best harmonic over that of the best from which on they are in doubt.
 pub(super) const DOUBTFUL: f32 = 0.3;
+/// The same where a centre that is off by little leads to another harmonic, which then shows as well.
+const SMALL_DOUBTFUL: f32 = 0.15;
 /// The same after the look about the centre, from which on nothing but edges tells them apart.
 const IN_DOUBT: f32 = 0.6;
+/// The same of another harmonic at its own best place, from which on not even edges do.
+const MOST_RIVAL: f32 = 0.9;
 /// Radius in pixels below which a centre that is off by two or three pixels fits the overtone as well.
 pub(super) const SMALL_PX: f32 = 20.0;
-/// Places to each side of the centre, and how far they are apart in radii.
+/// Pixels that a hand may move the axis by within a window. About a centre that is off by R / m, a harmonic m looks like its
+/// neighbour on one side of the rotor.
+const OFF_CENTRE_PX: f32 = 4.0;
+/// Places to each side of the centre, and how far they are apart in radii; then the same about the best of them.
 const PLACES: i8 = 3;
 const SPACING: f32 = 0.1;
-/// Events that a place is judged by.
-const MOST_EVENTS: usize = 512;
+const FINE_PLACES: i8 = 1;
+const FINE_SPACING: f32 = 0.05;
+/// What is collected about the centre, in radii, so that a place at the corner has its events too.
+const COLLECTED: f32 = 1.3;
+/// Events that are collected, of which about half are seen from a place; and those of a moment.
+const MOST_EVENTS: usize = 1_024;
+const MOMENT_EVENTS: usize = 512;
 
 /// The look about the centre, place by place.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Doubt {
     disc: Disc,
     line_hz: f32,
+    /// Whether a centre that is off by little leads to another harmonic.
+    small: bool,
+    /// Whether this is the second look, about the best place of the first, which lay at its border.
+    again: bool,
+    /// Whether the events are collected.
+    collected: bool,
+    /// Centre of the places, how far they are apart, and how many there are to each side.
+    from: Disc,
+    spacing_px: f32,
+    places: i8,
     row: i8,
     column: i8,
-    /// Share in step at the best place with its best harmonic.
+    /// Share in step at the best place with its best harmonic, and that of the best place of another.
     share: f32,
+    rival_share: f32,
     best: (Disc, i32),
 }
 
 impl Doubt {
-    pub(super) const fn new(disc: Disc, line_hz: f32) -> Self {
-        Self { disc, line_hz, row: -PLACES, column: -PLACES, share: 0.0, best: (disc, 0) }
+    pub(super) fn new(disc: Disc, line_hz: f32, harmonic: u32) -> Self {
+        Self {
+            disc,
+            line_hz,
+            small: is_small(disc, harmonic),
+            again: false,
+            collected: false,
+            from: disc,
+            spacing_px: SPACING * disc.radius_px,
+            places: PLACES,
+            row: -PLACES,
+            column: -PLACES,
+            share: 0.0,
+            rival_share: 0.0,
+            best: (disc, 0),
+        }
     }
 
-    /// Collects a segment's events about a place, or asks the place; `true` once all are asked.
+    /// Collects a segment's events, or asks a place; `true` once all are asked.
     fn step(
         &mut self,
         window: &Window<'_>,
@@ -47,41 +86,104 @@ impl Doubt {
         angular: &mut AngularSums,
         even: &mut Even,
     ) -> bool {
-        let spacing_px = SPACING * self.disc.radius_px;
-        let x_px = self.disc.x_px + f32::from(self.column) * spacing_px;
-        let y_px = self.disc.y_px + f32::from(self.row) * spacing_px;
-        let place = Disc { x_px, y_px, ..self.disc };
-        if !track(window, place, polar, even) {
+        if !self.collected {
+            let around = Disc { radius_px: COLLECTED * self.disc.radius_px, ..self.disc };
+            if track(window, around, polar, even) {
+                *even = Even::EMPTY;
+                // While a hand moves the axis by little, where that tells one harmonic from the next.
+                keep(polar, self.small);
+                self.collected = true;
+            }
             return false;
         }
-        *even = Even::EMPTY;
-        let stride = polar.len().div_ceil(MOST_EVENTS).max(1);
-        let mut index = 0;
-        polar.retain(|_| {
-            index += 1;
-            index % stride == 0
-        });
+        let x_px = self.from.x_px + f32::from(self.column) * self.spacing_px;
+        let y_px = self.from.y_px + f32::from(self.row) * self.spacing_px;
+        let place = Disc { x_px, y_px, ..self.disc };
+        self.ask(place, polar, angular);
+        self.column += 1;
+        if self.column > self.places {
+            self.column = -self.places;
+            self.row += 1;
+        }
+        if self.row <= self.places {
+            return false;
+        }
+        let last = self.places == FINE_PLACES;
+        let (best, harmonic) = self.best;
+        let border_px = (f32::from(PLACES) - 0.5) * self.spacing_px;
+        let off_px = larger((best.x_px - self.from.x_px).abs(), (best.y_px - self.from.y_px).abs());
+        if !last && !self.again && off_px > border_px {
+            // What lies beyond may be better still.
+            *self = Self { again: true, ..Self::new(best, self.line_hz, harmonic.unsigned_abs()) };
+            return false;
+        }
+        self.from = best;
+        self.spacing_px = FINE_SPACING * self.disc.radius_px;
+        self.places = FINE_PLACES;
+        (self.row, self.column) = (-FINE_PLACES, -FINE_PLACES);
+        last
+    }
+
+    /// Asks a place for its best harmonic.
+    fn ask(&mut self, place: Disc, polar: &mut PolarTrack, angular: &mut AngularSums) {
+        let (dx_px, dy_px) = (place.x_px - self.disc.x_px, place.y_px - self.disc.y_px);
+        // What is seen from there goes behind what is seen from the centre.
+        let (collected, annulus) = (polar.len(), Annulus::of(place));
+        for index in 0..collected {
+            let Some(event) = polar.get(index) else { break };
+            if let Some(event) = event.seen_from(dx_px, dy_px, &annulus) {
+                polar.push(event).ok();
+            }
+        }
         angular.clear();
-        scan(angular, polar, place, self.line_hz);
+        scan(angular, polar.get(collected..).unwrap_or(&[]), place, self.line_hz);
+        polar.truncate(collected);
         let found = harmonics(angular);
+        let mut less = (found.share, found.best);
         if found.share > self.share {
+            less = (self.share, self.best.1);
             self.share = found.share;
             self.best = (place, found.best);
         }
-        self.column += 1;
-        if self.column > PLACES {
-            self.column = -PLACES;
-            self.row += 1;
+        // Whoever is not the best is its rival.
+        if less.1 != self.best.1 {
+            self.rival_share = larger(self.rival_share, less.0);
         }
-        self.row > PLACES
     }
+}
+
+/// Whether blades stand so close together that a hand moves the axis from one harmonic to the next.
+fn is_small(disc: Disc, harmonic: u32) -> bool {
+    disc.radius_px < OFF_CENTRE_PX * harmonic as f32
+}
+
+/// Keeps events of all of the window, or of a moment in its middle.
+fn keep(polar: &mut PolarTrack, moment: bool) {
+    let (before, stride) = if moment {
+        (polar.len().saturating_sub(MOMENT_EVENTS) / 2, 1)
+    } else {
+        (0, polar.len().div_ceil(MOST_EVENTS).max(1))
+    };
+    let mut index = 0;
+    polar.retain(|_| {
+        index += 1;
+        index > before && index % stride == 0
+    });
+    polar.truncate(if moment { MOMENT_EVENTS } else { MOST_EVENTS });
 }
 
 impl Measurement {
     /// Whether another harmonic keeps step almost as well wherever the centre is thought to be, and no overtone settles it.
     pub(super) fn in_doubt(&self) -> bool {
         let settled = self.pose.has_overtone() && self.disc.radius_px >= SMALL_PX;
-        self.standing() > IN_DOUBT && !settled
+        let rivalled = |doubt: &Doubt| doubt.rival_share > MOST_RIVAL * doubt.share;
+        !settled && (self.standing() > IN_DOUBT || self.doubt.as_ref().is_some_and(rivalled))
+    }
+
+    /// Whether the centre is to be looked about, as another harmonic keeps step too.
+    pub(super) fn is_to_be_doubted(&self, rival: f32) -> bool {
+        let doubtful = if is_small(self.disc, self.harmonic) { SMALL_DOUBTFUL } else { DOUBTFUL };
+        self.doubt.is_none() && rival > doubtful
     }
 
     /// Whether there is any doubt: too much where no lock tells a harmonic from its neighbour.
