@@ -8,6 +8,8 @@ use evtach_core::{Reading, Speed};
 const TOUCH_US: u64 = 2;
 /// Readings follow each other by a third of a window: every third is independent.
 const OVERLAP: f64 = 3.0;
+/// Sigmas by which a slope stands out of the errors of the readings.
+const SLOPE_SIGMAS: f64 = 4.0;
 
 /// The mean speed within one reading's window.
 pub struct Piece {
@@ -37,50 +39,67 @@ impl Piece {
     fn variance(&self) -> f64 {
         f64::from(self.speed.omega_sigma_rad_s).powi(2)
     }
+
+    /// Finite also for a sigma of zero.
+    fn weight(&self) -> f64 {
+        1.0 / self.variance().max(f64::from(f32::MIN_POSITIVE))
+    }
 }
 
-/// A straight line through all readings; less than three are no line, and what they tell of acceleration is its slope.
+/// A straight line through all readings, each with the weight of its error; less than three are no line, and what they
+/// tell of acceleration is its slope.
 struct Line {
     origin_us: u64,
     t_mean_s: f64,
     mean_rad_s: f64,
-    slope_rad_s2: f64,
-    /// Sum of the squared distances in time from the mean, in s².
-    tt: f64,
+    /// Only where it stands out of the errors of the readings, or where these told it themselves.
+    slope_rad_s2: Option<f64>,
+    slope_variance: f64,
 }
 
 impl Line {
     fn through(pieces: &[Piece], origin_us: u64) -> Self {
-        let n = pieces.len() as f64;
         let t_s = |piece: &Piece| seconds(origin_us, piece.middle_us());
-        let t_mean_s = pieces.iter().map(t_s).sum::<f64>() / n;
-        let mean_rad_s = pieces.iter().map(Piece::omega_rad_s).sum::<f64>() / n;
-        let tt: f64 = pieces.iter().map(|p| (t_s(p) - t_mean_s).powi(2)).sum();
-        let ty: f64 =
-            pieces.iter().map(|p| (t_s(p) - t_mean_s) * (p.omega_rad_s() - mean_rad_s)).sum();
-        let told = pieces.iter().filter_map(|p| p.speed.alpha_rad_s2).map(f64::from);
-        let slope_rad_s2 =
-            if pieces.len() >= 3 && tt > 0.0 { ty / tt } else { told.sum::<f64>() / n };
-        Self { origin_us, t_mean_s, mean_rad_s, slope_rad_s2, tt }
+        let t_mean_s = weighted_mean(pieces, t_s);
+        let mean_rad_s = weighted_mean(pieces, Piece::omega_rad_s);
+        let sum =
+            |of: &dyn Fn(&Piece) -> f64| pieces.iter().map(|p| p.weight() * of(p)).sum::<f64>();
+        let tt = sum(&|p| (t_s(p) - t_mean_s).powi(2));
+        let ty = sum(&|p| (t_s(p) - t_mean_s) * (p.omega_rad_s() - mean_rad_s));
+        let (slope_rad_s2, slope_variance) = if pieces.len() >= 3 && tt > 0.0 {
+            let (slope_rad_s2, variance) = (ty / tt, OVERLAP / tt);
+            let stands_out = slope_rad_s2.abs() > SLOPE_SIGMAS * variance.sqrt();
+            (stands_out.then_some(slope_rad_s2), variance)
+        } else {
+            let told = pieces.iter().filter_map(|p| p.speed.alpha_rad_s2).map(f64::from);
+            let sum: f64 = told.sum();
+            ((sum != 0.0).then(|| sum / pieces.len() as f64), 0.0)
+        };
+        Self { origin_us, t_mean_s, mean_rad_s, slope_rad_s2, slope_variance }
     }
 
     fn at(&self, us: u64) -> f64 {
-        self.mean_rad_s + self.slope_rad_s2 * (seconds(self.origin_us, us) - self.t_mean_s)
+        let slope_rad_s2 = self.slope_rad_s2.unwrap_or(0.0);
+        self.mean_rad_s + slope_rad_s2 * (seconds(self.origin_us, us) - self.t_mean_s)
     }
+}
+
+/// Mean of the readings, each with the weight of its error.
+fn weighted_mean(pieces: &[Piece], of: impl Fn(&Piece) -> f64) -> f64 {
+    let weight: f64 = pieces.iter().map(Piece::weight).sum();
+    pieces.iter().map(|p| p.weight() * of(p)).sum::<f64>() / weight
 }
 
 /// Mean speed over `span_us` from readings in their order; `None` without any.
 ///
 /// A reading is the turn between its window's ends, so windows laid end to end are exact however the speed varies.
-/// What they leave open is filled in from the reading next to it, moved along the line through all, and is as
-/// uncertain as readings scatter about that line.
+/// What they leave open is filled in from the line through all and the reading next to it, each as far as it is
+/// known, and is as uncertain as readings scatter about that line.
 pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) -> Option<Speed> {
     let first = pieces.first()?;
-    let n = pieces.len() as f64;
     let line = Line::through(pieces, span_us.start);
     let off = |piece: &Piece| piece.omega_rad_s() - line.at(piece.middle_us());
-    let scatter = pieces.iter().map(|p| off(p).powi(2)).sum::<f64>() / n;
-    let variance = pieces.iter().map(Piece::variance).sum::<f64>() / n;
+    let scatter = weighted_mean(pieces, |p| off(p).powi(2));
 
     let clock = (f64::from(clock_sigma_ppm) * 1e-6 * line.mean_rad_s).powi(2);
     let (mut whole_s, mut turn_rad, mut turn_variance) = (0.0, 0.0, 0.0);
@@ -97,7 +116,12 @@ pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) 
         let middle_us = open_us.start.midpoint(open_us.end);
         if let Some(near) = pieces.iter().min_by_key(|p| p.middle_us().abs_diff(middle_us)) {
             let length_s = seconds(open_us.start, open_us.end);
-            add(length_s, line.at(middle_us) + off(near), scatter + near.variance());
+            let away_s = seconds(near.middle_us(), middle_us);
+            let moved = line.slope_rad_s2.map_or(0.0, |_| away_s * away_s * line.slope_variance);
+            // How much of what the next reading is off by the line is the speed's, and not its own error.
+            let own = scatter / (scatter + near.variance()).max(f64::from(f32::MIN_POSITIVE));
+            let variance = scatter + own * near.variance() + moved;
+            add(length_s, line.at(middle_us) + own * off(near), variance);
         }
         if let Some(tile) = tile {
             add(tile.length_us() as f64 * 1e-6, tile.omega_rad_s(), tile.variance());
@@ -105,33 +129,53 @@ pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) 
         reached_us = window_us.end;
     }
     let sigma_rad_s = (turn_variance / (whole_s * whole_s) + clock).sqrt();
-
-    // A slope is told only where it stands out of the error of the single readings, or where these told it themselves.
-    let told = if pieces.len() >= 3 {
-        line.slope_rad_s2.abs() * line.tt.sqrt() > 4.0 * OVERLAP.sqrt() * variance.sqrt()
-    } else {
-        line.slope_rad_s2 != 0.0
-    };
     Some(Speed {
         omega_rad_s: (turn_rad / whole_s) as f32,
         omega_sigma_rad_s: sigma_rad_s as f32,
-        alpha_rad_s2: told.then_some(line.slope_rad_s2 as f32),
+        alpha_rad_s2: line.slope_rad_s2.map(|slope| slope as f32),
         frame: first.speed.frame,
     })
 }
 
+/// What windows laid end to end cover, and the variance of the turn in them.
+#[derive(Clone, Copy, Default)]
+struct Cover {
+    length_us: u64,
+    turn_variance: f64,
+}
+
+impl Cover {
+    fn with(self, piece: &Piece) -> Self {
+        let length_s = piece.length_us() as f64 * 1e-6;
+        Self {
+            length_us: self.length_us + piece.length_us(),
+            turn_variance: self.turn_variance + length_s * length_s * piece.variance(),
+        }
+    }
+
+    /// More is better, and of as much that which is known best.
+    fn betters(self, other: Self) -> bool {
+        if self.length_us.abs_diff(other.length_us) <= TOUCH_US {
+            self.turn_variance < other.turn_variance
+        } else {
+            self.length_us > other.length_us
+        }
+    }
+}
+
 /// Windows that do not overlap and together cover the most, in the order of time.
 fn tiles(pieces: &[Piece]) -> Vec<&Piece> {
-    // Windows end one after the other. `most[i]` is the most that those before the i-th cover, and `from[i]` is how
+    // Windows end one after the other. `best[i]` is the best cover by those before the i-th, and `from[i]` is how
     // many come before it where it is one of them.
-    let mut most = vec![0];
+    let mut best = vec![Cover::default()];
     let mut from = Vec::new();
     for (i, piece) in pieces.iter().enumerate() {
         let start_us = piece.window_us.start + TOUCH_US;
         let before = pieces[..i].partition_point(|earlier| earlier.window_us.end <= start_us);
-        let with = most[before] + piece.length_us();
-        from.push((with > most[i]).then_some(before));
-        most.push(with.max(most[i]));
+        let with = best[before].with(piece);
+        let better = with.betters(best[i]);
+        from.push(better.then_some(before));
+        best.push(if better { with } else { best[i] });
     }
     let mut tiles = Vec::new();
     let mut left = pieces.len();
@@ -216,5 +260,19 @@ mod tests {
         let (mean_rad_s, sigma_rad_s) = mean(turn_rad, 440);
         assert!((mean_rad_s - turn_rad(0.44) / 0.44).abs() < 3.0 * sigma_rad_s);
         assert!(sigma_rad_s > 0.1, "{sigma_rad_s}");
+    }
+
+    #[test]
+    fn a_window_that_knows_little_bends_nothing() {
+        let piece = |start_us: u64, omega_rad_s, omega_sigma_rad_s| {
+            let speed =
+                Speed { omega_rad_s, omega_sigma_rad_s, alpha_rad_s2: None, frame: Frame::Camera };
+            Piece { window_us: start_us..start_us + 150_000, speed }
+        };
+        let pieces =
+            [piece(0, 203.0, 1.0), piece(50_000, 200.0, 0.01), piece(100_000, 200.01, 0.01)];
+        let mean = mean_speed(&pieces, &(0..400_000), 0.0).expect("readings");
+        assert!((mean.omega_rad_s - 200.005).abs() < 0.02, "{}", mean.omega_rad_s);
+        assert_eq!(mean.alpha_rad_s2, None);
     }
 }

@@ -15,7 +15,7 @@ pub(super) const DOUBTFUL: f32 = 0.3;
 /// The same after the look about the centre, from which on nothing but edges tells them apart.
 const IN_DOUBT: f32 = 0.6;
 /// Radius in pixels below which a centre that is off by two or three pixels fits the overtone as well.
-const SMALL_PX: f32 = 20.0;
+pub(super) const SMALL_PX: f32 = 20.0;
 /// Places to each side of the centre, and how far they are apart in radii.
 const PLACES: i8 = 3;
 const SPACING: f32 = 0.1;

@@ -2,6 +2,7 @@
 
 use super::super::baseline::Estimate;
 use super::baselines::FRACTION;
+use super::doubt::SMALL_PX;
 use super::{ACCELERATION_SIGMAS, Measurement, Stated};
 use crate::math::{TAU, sqrt};
 use crate::reading::{Reason, Status};
@@ -141,9 +142,11 @@ impl Measurement {
     }
 
     /// Whether jitter may scatter the blades' edges over so much of their distance that a registration matches noise: no overtone is
-    /// left of them. Then the phase alone tells, by all events of the window.
+    /// left of them. Then the phase alone tells, by all events of the window; but not where a neighbour of the harmonic may keep
+    /// step alone, as it does about the centre of a small rotor.
     pub(super) fn registers(&self) -> bool {
-        self.scatter_rad() < MOST_SCATTER_RAD || self.pose.has_overtone() || self.doubted()
+        let in_step_alone = self.doubted() || self.disc.radius_px < SMALL_PX;
+        self.scatter_rad() < MOST_SCATTER_RAD || self.pose.has_overtone() || in_step_alone
     }
 
     /// By how much the jitter of dim light scatters the phase that is followed: sigma scatters a phase of m w t by m w sigma.
