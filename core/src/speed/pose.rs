@@ -46,6 +46,8 @@ const FOLDED_PERIODS: usize = 3;
 const MOST_HARMONIC: u32 = 96;
 /// A doubled harmonic must keep this share of the events in step that were so at first.
 const SHARP_COHERENCE: f32 = 0.5;
+/// The same where blocks hold few events: a path that went astray at a sparse end does not find back to a harmonic so fine.
+const SPARSE_COHERENCE: f32 = 0.7;
 /// Blocks over which the wandering of the axis is judged.
 const DRIFT_BLOCKS: usize = 12;
 
@@ -315,8 +317,9 @@ impl Pose {
             moved_px = correct(&mut self.path, &sums.blocks, walk).unwrap_or(f32::MAX);
         }
         let at_high = sums.high.coherence(&sums.counts);
+        let least = if self.is_sparse() { SPARSE_COHERENCE } else { SHARP_COHERENCE };
         let worth = at_high > at_low
-            || fine && at_high > SHARP_COHERENCE * self.first_coherence && 2.0 * at_high > at_low;
+            || fine && at_high > least * self.first_coherence && 2.0 * at_high > at_low;
         let sharper = worth && self.may_double();
         self.harmonic *= if sharper { 2 } else { 1 };
         self.coherence = if sharper { at_high } else { at_low };
@@ -328,6 +331,11 @@ impl Pose {
             self.divide();
         }
         false
+    }
+
+    /// Whether blocks are as long as few events make them.
+    fn is_sparse(&self) -> bool {
+        (self.events as f32 * self.even_share) < (BLOCK_EVENTS * MAX_KNOTS) as f32
     }
 
     const fn may_double(&self) -> bool {
