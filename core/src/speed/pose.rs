@@ -49,8 +49,8 @@ const FOLDED_PERIODS: usize = 3;
 const MOST_HARMONIC: u32 = 96;
 /// A doubled harmonic must keep this share of the events in step that were so at first.
 const SHARP_COHERENCE: f32 = 0.5;
-/// Slower wandering of the axis than this in px/s is the measurement's own noise.
-pub const STILL_PX_S: f32 = 6.0;
+/// The same where blocks hold few events: a path that went astray at a sparse end does not find back to a harmonic so fine.
+const SPARSE_COHERENCE: f32 = 0.7;
 /// Blocks over which the wandering of the axis is judged.
 const DRIFT_BLOCKS: usize = 12;
 
@@ -349,8 +349,9 @@ impl Pose {
             }
         }
         let at_high = sums.high.coherence(&sums.counts);
+        let least = if self.is_sparse() { SPARSE_COHERENCE } else { SHARP_COHERENCE };
         let worth = at_high > at_low
-            || fine && at_high > SHARP_COHERENCE * self.first_coherence && 2.0 * at_high > at_low;
+            || fine && at_high > least * self.first_coherence && 2.0 * at_high > at_low;
         let sharper = worth && self.may_double();
         self.harmonic *= if sharper { 2 } else { 1 };
         self.coherence = if sharper { at_high } else { at_low };
@@ -367,6 +368,11 @@ impl Pose {
     /// A sample of the events tells it well enough.
     fn asks_tilt(&self) -> bool {
         self.tilts && self.schedule.phase() < Phase::All
+    }
+
+    /// Whether blocks are as long as few events make them.
+    fn is_sparse(&self) -> bool {
+        (self.events as f32 * self.even_share) < (BLOCK_EVENTS * MAX_KNOTS) as f32
     }
 
     const fn may_double(&self) -> bool {
@@ -468,10 +474,6 @@ impl Pose {
     fn trend(&self, sums: &Sums) -> Option<Slope> {
         let count = self.path.blocks();
         let periods = count / self.in_period.max(1);
-        let drift_px_s = self.drift_px_s();
-        // Where the axis wanders, blocks a period apart see other pixels.
-        let folded = periods >= FOLDED_PERIODS && drift_px_s < STILL_PX_S;
-        let fold = if folded { self.in_period.max(1) } else { 1 };
         let half_us = 0.5 * self.window_us;
         let mut points = Vec::<Point, MAX_KNOTS>::new();
         for block in sums.blocks.iter().take(count) {
@@ -480,7 +482,13 @@ impl Pose {
             let y = self.path.at(t_us).turn_rad + off_rad;
             points.push(Point { u: t_us / half_us, y, weight }).ok();
         }
-        let trend = Trend::fit(&points, fold)?;
+        // Blocks a period apart see the same pixels, unless the axis wanders: what tells more exactly.
+        let folded = periods >= FOLDED_PERIODS && self.in_period > 1;
+        let trend = [1, self.in_period]
+            .into_iter()
+            .take(1 + usize::from(folded))
+            .filter_map(|fold| Trend::fit(&points, fold))
+            .min_by(|a, b| a.slope_error.total_cmp(&b.slope_error))?;
         let factor = student_over_normal(trend.degrees_of_freedom);
         let half_s = half_us * 1e-6;
         Some(Slope {
@@ -490,7 +498,7 @@ impl Pose {
             },
             alpha_rad_s2: trend.bend / (half_s * half_s),
             alpha_sigma_rad_s2: factor * trend.bend_error / (half_s * half_s),
-            drift_px_s,
+            drift_px_s: self.drift_px_s(),
         })
     }
 

@@ -6,7 +6,6 @@ use super::doubt::SMALL_PX;
 use super::{ACCELERATION_SIGMAS, Measurement, Stated};
 use crate::math::{TAU, sqrt};
 use crate::reading::{Reason, Status};
-use crate::speed::pose::STILL_PX_S;
 use crate::speed::queue::stretch;
 use crate::store::Window;
 use crate::tachometer::BASE_WINDOW_US;
@@ -60,6 +59,8 @@ const QUEUE_SIGMA: f32 = 0.5;
 /// Roll of a hand-held camera for each pixel of shift, which has two directions where roll has one: tremor turns the camera by about
 /// one milliradian as it shifts the image by one pixel along either.
 const ROLL_RAD_PER_PX: f32 = 1e-3 / core::f32::consts::SQRT_2;
+/// Slower wandering of the centre than this in px/s is the measurement's own noise.
+const STILL_PX_S: f32 = 6.0;
 /// Window over which the mean roll rate of a tremor of 1 to 12 Hz, from which longer ones keep the less, is what it is at an instant.
 const ROLL_LASTS_S: f32 = 0.067;
 /// Each half of a window holds twice the roll of the whole, so the halves differ by the root of eight of it, half a window apart.

@@ -24,7 +24,7 @@ pub const WALK_PX: f32 = 0.5;
 pub const WALK_SINGLE_PX: f32 = 0.05;
 /// Turn beyond an even one from knot to knot, in rad/s: what a hand rolls, and as a share of the speed, what a motor hunts.
 const WALK_RAD_S: f32 = 0.2;
-const WALK_SHARE: f32 = 0.005;
+const WALK_SHARE: f32 = 0.01;
 /// Farthest that a knot is moved at once.
 const STRIDE_PX: f32 = 3.0;
 
@@ -187,9 +187,14 @@ pub fn correct(path: &mut Path, blocks: &[Block; MAX_KNOTS], walk: Walk) -> Opti
     let scatter = 1.0 / (2.0 * walk.coherence.max(LEAST_SHARE));
     let (px, rad) = (scatter / (walk.step_px * walk.step_px), scatter / (walk_rad * walk_rad));
     let stiff = Matrix3::from_diagonal(&Vector3::new(rad, px, px));
+    // A speed that is off from the start is no walk.
+    let even_rad = match (knots.first(), knots.last()) {
+        (Some(first), Some(last)) => (last.turn_rad - first.turn_rad) / blocks.len().max(1) as f32,
+        _ => 0.0,
+    };
     let step = |k: usize| -> Option<Vector3<f32>> {
         let (a, b) = (knots.get(k)?, knots.get(k + 1)?);
-        Some(Vector3::new(b.turn_rad - a.turn_rad, b.x_px - a.x_px, b.y_px - a.y_px))
+        Some(Vector3::new(b.turn_rad - a.turn_rad - even_rad, b.x_px - a.x_px, b.y_px - a.y_px))
     };
     let link = |block: &Block| block.weight(m) * block.shares().1 - stiff;
     let mut inverses = Vec::<Matrix3<f32>, MAX_KNOTS>::new();
