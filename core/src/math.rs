@@ -18,6 +18,28 @@ pub fn sqrt(x: f32) -> f32 {
     libm::sqrtf(x)
 }
 
+/// The nearest whole number, halves away from zero; of what is below 2^31.
+#[must_use]
+#[inline(never)]
+pub fn round(x: f32) -> f32 {
+    // Just below a half, or the largest number below it were rounded up.
+    let half = 0.5 - 0.25 * f32::EPSILON;
+    ((x + half.copysign(x)) as i32) as f32
+}
+
+/// The whole number below x, which is 0 or above, and below 2^31. In two instructions; libm's, for all numbers, are functions.
+#[must_use]
+pub const fn floor(x: f32) -> f32 {
+    (x as i32) as f32
+}
+
+/// The whole number above x, which is above -1, and below 2^31.
+#[must_use]
+pub const fn ceil(x: f32) -> f32 {
+    let below = (x as i32) as f32;
+    if below < x { below + 1.0 } else { below }
+}
+
 /// Angle of the vector (x, y) in radians, -pi to pi; positive = clockwise on a screen with y down.
 #[must_use]
 pub fn atan2(y: f32, x: f32) -> f32 {
@@ -222,6 +244,21 @@ mod tests {
     fn many_turns_wrap() {
         assert!(Turn::from_rad(3.0 * TAU + 0.5).minus(Turn::from_rad(0.5)).rad().abs() < 2e-6);
         assert!(Turn::from_rad(-2.5 * TAU).minus(Turn(0x8000_0000)).rad().abs() < 2e-6);
+    }
+
+    #[test]
+    fn whole_numbers_are_libms() {
+        let halves = (-2_001..2_001).map(|n| 0.5 * n as f32);
+        let near = halves.flat_map(|x| [x.next_down(), x, x.next_up()]);
+        for x in near.chain([0.499_999_97, 8_388_607.5, 8_388_609.0, 1e9]) {
+            assert_eq!(round(x), libm::roundf(x), "{x}");
+            if x > -1.0 {
+                assert_eq!(ceil(x), libm::ceilf(x), "{x}");
+            }
+            if x >= 0.0 {
+                assert_eq!(floor(x), libm::floorf(x), "{x}");
+            }
+        }
     }
 
     #[test]

@@ -40,13 +40,27 @@ pub struct Settings {
     pub window_us: Option<u32>,
     /// One standard deviation of the sensor clock's error, in ppm.
     pub clock_sigma_ppm: f32,
+    /// One standard deviation of the gyro's zero-rate offset in rad/s, as far as it is known before it is heard: it is found
+    /// while measuring.
+    pub gyro_sigma_rad_s: f32,
 }
+
+/// Standard deviation of the zero-rate offset in rad/s of a gyro that nobody calibrated: within 20 degrees a second (data sheet of the
+/// MPU-6150; the BMI160's says 3).
+const UNCALIBRATED_RAD_S: f32 = 0.2;
 
 impl Settings {
     /// Settings that fit any rotor in front of a sensor of this size.
     #[must_use]
     pub const fn new(geometry: Geometry) -> Self {
-        Self { geometry, roi: None, blades: None, window_us: None, clock_sigma_ppm: 15.0 }
+        Self {
+            geometry,
+            roi: None,
+            blades: None,
+            window_us: None,
+            clock_sigma_ppm: 15.0,
+            gyro_sigma_rad_s: UNCALIBRATED_RAD_S,
+        }
     }
 }
 
@@ -75,7 +89,7 @@ pub enum Poll {
     Ready(Reading),
 }
 
-/// Events that were not used, by cause, since the start.
+/// Events that were handed in and not used, by cause, since the start: each counts once, whatever it stands for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Ignored {
     /// Outside the sensor.
@@ -84,6 +98,7 @@ pub struct Ignored {
     pub out_of_roi: u64,
     /// Older than the event before, or from a future that no clock reaches.
     pub out_of_order: u64,
-    /// Arrived while the store was full because a measurement had not ended.
+    /// In no window that was measured: they arrived while a measurement lasted longer than the store does, or right before
+    /// a break in the stream.
     pub overrun: u64,
 }

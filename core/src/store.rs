@@ -14,11 +14,13 @@ mod even;
 mod event;
 mod lengthen;
 mod open;
+mod roll;
 mod window;
 
 pub use even::Even;
 pub(crate) use event::MOST_WEIGHT_LOG2;
 pub use event::StoredEvent;
+pub use roll::Roll;
 pub use window::{Account, Window};
 
 use open::Segment;
@@ -49,6 +51,9 @@ pub struct Store<'m> {
     given_up: u64,
     segment_us: u32,
     thinned: u64,
+    /// The camera's roll in all segments that went by, and in those given up behind the ones that are measured.
+    rolled: Roll,
+    rolled_behind: Roll,
 }
 
 impl<'m> Store<'m> {
@@ -68,16 +73,39 @@ impl<'m> Store<'m> {
             given_up: 0,
             segment_us: segment_us.max(1),
             thinned: 0,
+            rolled: Roll::NONE,
+            rolled_behind: Roll::NONE,
         }
     }
 
-    /// Forgets everything; the next segment starts at `start_us`.
-    pub fn restart(&mut self, start_us: u64, segment_us: u32) {
+    /// Forgets everything; the next segment starts at `start_us`. Returns how many events went that no window had measured.
+    pub fn restart(&mut self, start_us: u64, segment_us: u32) -> u64 {
+        let unmeasured = (0..=self.closed).map(|index| self.forget(index)).sum();
         self.segments = [Segment::default(); MOST_SEGMENTS];
         self.closed = 0;
         self.start_us = start_us;
         self.given_up = 0;
         self.segment_us = segment_us.max(1);
+        self.rolled_behind = Roll::NONE;
+        unmeasured
+    }
+
+    /// What no window has measured of a segment that goes: that many events were not used, and none of them were thinned.
+    #[inline(never)]
+    fn forget(&mut self, index: usize) -> u64 {
+        let Segment { counted, len, unmeasured, .. } = self.segments[self.slot(index)];
+        if unmeasured > 0 {
+            self.thinned = self.thinned.saturating_sub(counted.saturating_sub(len as u64));
+        }
+        u64::from(unmeasured)
+    }
+
+    /// The oldest segments, so many, have been measured.
+    pub fn measured(&mut self, segments: usize) {
+        for index in 0..segments.min(self.closed + 1) {
+            let slot = self.slot(index);
+            self.segments[slot].unmeasured = 0;
+        }
     }
 
     /// Events left out on purpose since the beginning.
@@ -145,6 +173,21 @@ impl<'m> Store<'m> {
         self.segments[slot].roll_count += 1;
     }
 
+    /// What a segment's gyro samples say, if it has any.
+    #[inline(never)]
+    fn roll_of(&self, index: usize) -> Roll {
+        let Segment { roll_sum_rad_s, roll_count, .. } = self.segments[self.slot(index)];
+        if roll_count == 0 {
+            return Roll::NONE;
+        }
+        Roll::at(roll_sum_rad_s / roll_count as f32, self.segment_us)
+    }
+
+    /// Forgets what the gyro said: it is another one.
+    pub const fn forget_roll(&mut self) {
+        self.rolled = Roll::NONE;
+    }
+
     /// Closes the open segment and opens the next. The ring must not be [`Self::full`].
     pub fn close_segment(&mut self) {
         debug_assert!(!self.full());
@@ -158,24 +201,25 @@ impl<'m> Store<'m> {
     #[inline(never)]
     pub fn drop_oldest(&mut self) {
         if self.closed > 0 {
+            self.rolled = self.rolled.and(self.roll_of(0));
             self.places[..self.ring].rotate_left(1);
             self.closed -= 1;
             self.start_us += u64::from(self.segment_us);
         }
     }
 
-    /// Gives up the oldest closed segment behind the first `measured` ones, and returns how many events went with it
-    /// that counted as used or thinned so far.
+    /// Gives up the oldest closed segment behind the first `measured` ones, and returns how many events went with it, each counted
+    /// once, whatever it stands for.
     pub fn give_up(&mut self, measured: usize) -> u64 {
         if measured >= self.closed {
             return 0;
         }
-        let Segment { counted, len, .. } = self.segments[self.slot(measured)];
-        self.thinned = self.thinned.saturating_sub(counted.saturating_sub(len as u64));
+        let unmeasured = self.forget(measured);
+        self.rolled_behind = self.rolled_behind.and(self.roll_of(measured));
         self.places[measured..self.ring].rotate_left(1);
         self.closed -= 1;
         self.given_up += 1;
-        counted
+        unmeasured
     }
 
     /// Moves on from the first `measured` segments to what follows the ones given up behind them.
@@ -183,6 +227,8 @@ impl<'m> Store<'m> {
         for _ in 0..measured.min(self.closed) {
             self.drop_oldest();
         }
+        // Only now: what is measured must not know of what came behind it.
+        self.rolled = self.rolled.and(core::mem::take(&mut self.rolled_behind));
         self.start_us += self.given_up * u64::from(self.segment_us);
         self.given_up = 0;
     }

@@ -15,7 +15,7 @@ mod work;
 use heapless::Vec;
 
 use crate::limits::{MAX_ROTORS, MAX_SUSPECTS};
-use crate::rotors::extraction::Extraction;
+use crate::rotors::extraction::{Extraction, Round};
 use crate::rotors::{Found, HeatMap, Spectrum};
 use crate::settings::{Ignored, Memory, Settings};
 use crate::speed::measurement::{Measurement, Outcome};
@@ -85,8 +85,10 @@ pub struct Tachometer<'m> {
     /// Whether a rotor that is followed was not locked in this window.
     lost: bool,
     tracker: Tracker,
-    /// Readings until the whole image is searched again.
+    /// Readings until the whole image is searched again, or [`rhythm::NEVER`].
     until_search: u8,
+    /// How far the search beside the rotors has got that is spread over readings.
+    round: Round,
     stretch: Stretch,
     /// When the window begins anew, in microseconds; until then none is measured.
     anew_us: Option<u64>,
@@ -135,6 +137,7 @@ impl<'m> Tachometer<'m> {
             lost: false,
             tracker: Tracker::default(),
             until_search: 0,
+            round: Round::default(),
             stretch: Stretch::default(),
             anew_us: None,
         }
@@ -147,6 +150,7 @@ impl<'m> Tachometer<'m> {
         self.heat.resize(settings.geometry);
         self.tracker = Tracker::default();
         self.stretch = Stretch::default();
+        self.store.forget_roll();
         self.started = false;
         self.window_segments = 0;
         self.job = Job::Idle;

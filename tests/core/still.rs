@@ -147,3 +147,42 @@ fn a_slow_rotor_after_a_still_scene_keeps_its_long_window() {
         }
     }
 }
+
+/// On the device, which searches for it in parts, while it follows another.
+#[test]
+fn what_turns_later_beside_a_rotor_is_found_while_that_one_is_read() {
+    // 40 turns, so that the first goes on as if nothing had happened.
+    const ALONE_MS: f64 = 1_600.0;
+    const BOTH_MS: f64 = 4_000.0;
+    let first = Rotor { rpm: 1500.0, radius_px: 40.0, x_px: 90.0, y_px: 130.0, ..Rotor::default() };
+    for (rpm, radius_px) in [(-2300.0, 35.0), (3100.0, 12.0)] {
+        let second = Rotor { rpm, radius_px, x_px: 260.0, y_px: 120.0, ..Rotor::default() };
+        let alone = Scene { rotors: vec![first.clone()], ..Scene::default() };
+        let both = Scene { rotors: vec![first.clone(), second], ..Scene::default() };
+        let mut events = Vec::new();
+        then(&mut events, &alone, ALONE_MS);
+        let on_us = then(&mut events, &both, BOTH_MS);
+        let readings = read(&events, Capacity::Device, 500, u32::MAX);
+        let speeds =
+            |reading: &Reading| reading.rotors.iter().filter(|rotor| rotor.speed.is_some()).count();
+        let found = readings.iter().position(|reading| speeds(reading) == 2);
+        let found = found.expect("a reading of both");
+        let after_us = end_us(&readings[found]).saturating_sub(on_us);
+        let behind = &readings[found..];
+        let of_both = behind.iter().filter(|reading| speeds(reading) == 2).count();
+        show(&format!(
+            "radius {radius_px} px: found after {:.1} s; both in {of_both} of {} readings from then on",
+            after_us as f64 * 1e-6,
+            behind.len()
+        ));
+        assert!(after_us < 3_500_000, "{after_us}");
+        assert!(10 * of_both >= 9 * behind.len(), "{of_both} of {}", behind.len());
+        for reading in behind {
+            for rotor in &reading.rotors {
+                let told = rotor.speed.map_or(0.0, |speed| speed.omega_rad_s * 9.549_297);
+                let truth = if rotor.x_px < 175.0 { 1500.0 } else { rpm as f32 };
+                assert!(rotor.speed.is_none() || (told / truth - 1.0).abs() < 5e-3, "{reading:#?}");
+            }
+        }
+    }
+}

@@ -54,7 +54,7 @@ impl LocalGrid {
         Self {
             x0: (x_px - half_px).max(0.0) as u16,
             y0: (y_px - half_px).max(0.0) as u16,
-            columns: (libm::ceilf(side_px / cell_px) as u32).min(COHERENCE_COLUMNS as u32),
+            columns: (crate::math::ceil(side_px / cell_px) as u32).min(COHERENCE_COLUMNS as u32),
             cell_px,
             per_px: (65_536.0 / cell_px) as u32,
         }

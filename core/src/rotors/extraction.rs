@@ -16,8 +16,11 @@
 
 mod look;
 mod quarters;
+mod round;
 mod slow;
 mod split;
+
+pub use round::Round;
 
 use heapless::Vec;
 
@@ -160,6 +163,11 @@ pub struct Extraction {
     /// Lines looked into, and those in this quarter.
     looks: usize,
     quarter_looks: usize,
+    /// How much is searched before this ends: all, or one part; whether that part has had its spectrum and its look; and the
+    /// cells that the part before left to this one, as a power of two.
+    in_parts: bool,
+    looked: bool,
+    cell_log2: u8,
     /// Where all that moves lies, once what turns slowly is looked for.
     swept: Option<Disc>,
     /// Rotors by every line: the same one may stand here twice.
@@ -267,6 +275,12 @@ impl Extraction {
             self.stage = Stage::Moving;
             return;
         }
+        self.begin_round();
+        self.done();
+    }
+
+    /// Ends with the candidates that there are.
+    fn done(&mut self) {
         // A piece of a rotor, or a rotor by the line of its neighbour, explains fewer events than the rotor by
         // its own line.
         sort_few(&mut self.candidates, |a, b| a.explained.total_cmp(&b.explained).is_gt());

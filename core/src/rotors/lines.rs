@@ -107,7 +107,7 @@ impl Spectrum {
 fn fundamental_first(lines: &mut Lines, sample_hz: f32) {
     let Some(highest) = lines.first().copied() else { return };
     let below = |line: &Line| {
-        let ratio = libm::roundf(highest.hz / line.hz);
+        let ratio = crate::math::round(highest.hz / line.hz);
         let off_hz = (highest.hz - ratio * line.hz).abs();
         ratio > 1.0
             && off_hz < (0.5 + 0.25 * ratio) * sample_hz

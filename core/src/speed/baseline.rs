@@ -114,7 +114,7 @@ impl Pairs {
             return true;
         }
         let angle_rad = self.pace.signed_angle_rad();
-        let start_rad = (self.periods - libm::roundf(self.periods)) * angle_rad;
+        let start_rad = (self.periods - crate::math::round(self.periods)) * angle_rad;
         if !self.registering {
             self.cut(window, path, icp);
             let residual = Residual::Helicoid { omega_rad_s: self.pace.omega_rad_s };

@@ -403,14 +403,14 @@ impl Pose {
         // In a short window a hand does little, and a trend still needs its points.
         let still_us = SHORTEST_BLOCK_US.min(self.window_us / (2 * LEAST_BLOCKS) as f32);
         let shortest = (self.window_us / most).max(still_us);
-        let split = libm::floorf((self.period_us / shortest).min(MOST_IN_PERIOD));
+        let split = crate::math::floor((self.period_us / shortest).min(MOST_IN_PERIOD));
         let step_us = if split >= 1.0 {
             self.period_us / split
         } else {
-            self.period_us * libm::roundf(shortest / self.period_us).max(1.0)
+            self.period_us * crate::math::round(shortest / self.period_us).max(1.0)
         };
         self.in_period = split as usize;
-        let blocks = libm::ceilf(self.window_us / step_us - 0.25) as usize;
+        let blocks = crate::math::ceil(self.window_us / step_us - 0.25) as usize;
         self.path = self.path.divided(-0.5 * self.window_us, step_us, blocks);
     }
 

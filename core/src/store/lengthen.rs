@@ -59,6 +59,7 @@ impl Store<'_> {
             for (i, segment) in old.iter().enumerate().take(self.closed + 1) {
                 if (i as u64 * old_us) / u64::from(segment_us) == new as u64 {
                     merged.lost = merged.lost.saturating_add(segment.lost);
+                    merged.unmeasured = merged.unmeasured.saturating_add(segment.unmeasured);
                     merged.roll_sum_rad_s += segment.roll_sum_rad_s;
                     merged.roll_count += segment.roll_count;
                 }

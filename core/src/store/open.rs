@@ -16,8 +16,10 @@ const OCTAVES: u8 = 3;
 pub(super) struct Segment {
     /// Events kept.
     pub len: usize,
-    /// Events that came.
+    /// Events that came, each for as many as it stands for.
     pub counted: u64,
+    /// Events that were handed in and that no window has measured yet.
+    pub unmeasured: u32,
     /// Events that were lost before.
     pub lost: u64,
     pub roll_sum_rad_s: f32,
@@ -101,6 +103,7 @@ impl Store<'_> {
         segment.skip = (next.saturating_sub(events.len()) as u32) << weight_log2 | rest;
         let arrived = (events.len() as u64) << weight_log2;
         segment.counted += arrived;
+        segment.unmeasured = segment.unmeasured.saturating_add(events.len() as u32);
         self.thinned += arrived - count as u64;
     }
 

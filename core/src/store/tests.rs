@@ -105,6 +105,44 @@ fn what_is_given_up_is_counted_and_the_next_window_begins_with_the_latest() {
 }
 
 #[test]
+fn what_no_window_measured_is_counted_once_whatever_it_stands_for() {
+    let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
+    let mut store = Store::new(&mut memory, MOST_SPARE, 1_000);
+    let (mut handed_in, mut unmeasured) = (0, 0);
+    let mut fill_until = |store: &mut Store<'_>, until_us: u64| {
+        let mut given_up = 0;
+        for t_us in handed_in..until_us {
+            while t_us >= store.open_end_us() {
+                if store.full() {
+                    given_up += store.give_up(WINDOW_SEGMENTS);
+                }
+                store.close_segment();
+            }
+            // Seven of eight were left out before.
+            store.push(&[PackedEvent::pack(&event(t_us))], 3, |_, _| {});
+        }
+        handed_in = until_us;
+        given_up
+    };
+    unmeasured += fill_until(&mut store, 12_500);
+    assert_eq!(unmeasured, 3_000);
+    store.measured(WINDOW_SEGMENTS);
+    store.mend(WINDOW_SEGMENTS);
+    // Four of the next six segments, and the two behind them, are measured once more, and count once.
+    unmeasured += fill_until(&mut store, 16_500);
+    store.measured(WINDOW_SEGMENTS);
+    store.drop_oldest();
+    store.drop_oldest();
+    unmeasured += fill_until(&mut store, 17_200);
+    store.lengthen(2_000);
+    assert_eq!(unmeasured, 3_000);
+    // The stream breaks off: from 15 000 on nothing was measured.
+    unmeasured += store.restart(99_000_000, 1_000);
+    assert_eq!(unmeasured, 3_000 + 2_200);
+    assert_eq!(store.restart(99_000_000, 1_000), 0);
+}
+
+#[test]
 fn those_that_are_kept_stand_for_all() {
     let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
     let mut store = Store::new(&mut memory, MOST_SPARE, 100_000);

@@ -1,6 +1,6 @@
 //! What the store hands out: the events of a stretch of time, and where they went.
 
-use super::{MOST_SEGMENTS, Store, StoredEvent};
+use super::{MOST_SEGMENTS, Roll, Store, StoredEvent};
 
 impl Store<'_> {
     /// The window over the oldest `segments` segments (the open one counts as the last when all closed
@@ -27,7 +27,7 @@ impl Store<'_> {
     /// Events counted, kept and lost in the oldest `segments` segments.
     #[must_use]
     pub fn account(&self, segments: usize) -> Account {
-        let mut account = Account::default();
+        let mut account = Account { rolled: self.rolled, ..Account::default() };
         for index in 0..segments.min(self.closed + 1) {
             let segment = &self.segments[self.slot(index)];
             account.counted += segment.counted;
@@ -35,6 +35,7 @@ impl Store<'_> {
             account.lost = account.lost.saturating_add(segment.lost);
             account.roll_sum_rad_s += segment.roll_sum_rad_s;
             account.roll_count += segment.roll_count;
+            account.rolled = account.rolled.and(self.roll_of(index));
         }
         account
     }
@@ -53,6 +54,8 @@ pub struct Account {
     roll_sum_rad_s: f32,
     /// Number of roll rates.
     roll_count: u32,
+    /// The camera's roll up to the end of the window, as far as it was heard.
+    pub rolled: Roll,
 }
 
 impl Account {

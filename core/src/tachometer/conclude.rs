@@ -28,21 +28,22 @@ const SEARCH_AGAIN: u8 = 2;
 const LEAST_EVENTS: u64 = 300;
 /// Share of events lost beyond which the rest is not trusted.
 const MOST_LOST: f32 = 0.5;
-/// Standard deviation of a gyro's zero-rate offset in rad/s, with the offset calibrated on a still camera.
-const GYRO_OFFSET_RAD_S: f32 = 3e-3;
 
 impl Tachometer<'_> {
     /// Turns the outcomes into a reading and moves the window on.
     pub(super) fn conclude(&mut self) -> Reading {
         let segments = self.window_segments;
         let account = self.store.account(segments);
+        self.store.measured(segments);
         let window = self.store.window(segments, self.window_end_us);
         let (start_us, window_us) = (window.start_us, window.duration_us);
         self.tracker.start_reading();
+        let (offset_rad_s, sigma_rad_s) = account.rolled.offset(self.settings.gyro_sigma_rad_s);
+        let roll = account.roll_rad_s().map(|heard| (heard - offset_rad_s, sigma_rad_s));
         let mut rotors = Vec::<RotorReading, MAX_ROTORS>::new();
         for outcome in &self.outcomes {
             let id = self.tracker.identify(outcome);
-            rotors.push(rotor_reading(id, outcome, account.roll_rad_s())).ok();
+            rotors.push(rotor_reading(id, outcome, roll)).ok();
         }
         sort_few(&mut rotors, |a, b| a.id < b.id);
         let lost =
@@ -142,15 +143,16 @@ impl Tachometer<'_> {
     }
 }
 
-fn rotor_reading(id: u8, outcome: &Outcome, roll_rad_s: Option<f32>) -> RotorReading {
+/// What is told of a rotor; `roll` is the camera's roll by its gyro and the standard deviation of that, in rad/s.
+fn rotor_reading(id: u8, outcome: &Outcome, roll: Option<(f32, f32)>) -> RotorReading {
     let mut speed = outcome.speed;
     if let Some(speed) = &mut speed {
-        // The gyro serves where its offset is smaller than what the hand may have rolled.
+        // The gyro serves where its offset is known better than what the hand may have rolled.
         let mut roll_sigma = outcome.roll_sigma_rad_s;
-        if let Some(roll_rad_s) = roll_rad_s.filter(|_| GYRO_OFFSET_RAD_S < roll_sigma) {
+        if let Some((roll_rad_s, sigma_rad_s)) = roll.filter(|(_, sigma)| *sigma < roll_sigma) {
             speed.omega_rad_s -= roll_rad_s;
             speed.frame = Frame::Room;
-            roll_sigma = GYRO_OFFSET_RAD_S;
+            roll_sigma = sigma_rad_s;
         }
         let sigma = speed.omega_sigma_rad_s;
         speed.omega_sigma_rad_s = crate::math::sqrt(sigma * sigma + roll_sigma * roll_sigma);
@@ -181,7 +183,7 @@ fn best_status(rotors: &[RotorReading], in_step_hz: Option<f32>) -> Status {
 fn is_mains(hz: f32) -> bool {
     [100.0, 120.0].iter().any(|mains| {
         let ratio = hz / mains;
-        let nearest = libm::roundf(ratio);
+        let nearest = crate::math::round(ratio);
         nearest >= 1.0 && (ratio - nearest).abs() * mains < 4.0
     })
 }

@@ -77,15 +77,15 @@ impl Tachometer<'_> {
             let rest = &events[taken..];
             let passed = &rest[..gate.admit(rest)];
             if self.overrun {
-                self.ignored.overrun += (passed.len() as u64) << weight_log2;
+                self.ignored.overrun += passed.len() as u64;
             } else {
                 self.store_all(passed, weight_log2);
             }
             taken += passed.len();
             let Some(stopped) = events.get(taken) else { break };
             match gate.outside(*stopped) {
-                Some(Outside::Sensor) => self.ignored.out_of_bounds += 1 << weight_log2,
-                Some(Outside::Roi) => self.ignored.out_of_roi += 1 << weight_log2,
+                Some(Outside::Sensor) => self.ignored.out_of_bounds += 1,
+                Some(Outside::Roi) => self.ignored.out_of_roi += 1,
                 None => break,
             }
             taken += 1;
@@ -99,22 +99,21 @@ impl Tachometer<'_> {
     }
 
     fn push_one(&mut self, event: &Event, weight_log2: u8) {
-        let count = 1 << weight_log2;
         if !self.settings.geometry.contains(event.x, event.y) {
-            self.ignored.out_of_bounds += count;
+            self.ignored.out_of_bounds += 1;
             return;
         }
         if self.settings.roi.is_some_and(|roi| !roi.contains(event.x, event.y)) {
-            self.ignored.out_of_roi += count;
+            self.ignored.out_of_roi += 1;
             return;
         }
         if event.t_us > LATEST_US {
-            self.ignored.out_of_order += count;
+            self.ignored.out_of_order += 1;
             return;
         }
         if event.t_us < self.last_us && self.started {
             if self.last_us - event.t_us < CLOCK_RESET_US {
-                self.ignored.out_of_order += count;
+                self.ignored.out_of_order += 1;
                 return;
             }
             self.started = false;
@@ -127,7 +126,7 @@ impl Tachometer<'_> {
             self.advance(event.t_us);
         }
         if self.overrun {
-            self.ignored.overrun += count;
+            self.ignored.overrun += 1;
             return;
         }
         self.store_all(&[PackedEvent::pack(event)], weight_log2);
@@ -149,7 +148,8 @@ impl Tachometer<'_> {
         self.window_segments = 0;
         self.job = Job::Idle;
         self.target_us = self.settings.window_us.unwrap_or(BASE_WINDOW_US);
-        self.store.restart(t_us, segment_us(FIRST_WINDOW_US.min(self.target_us)));
+        let first_us = segment_us(FIRST_WINDOW_US.min(self.target_us));
+        self.ignored.overrun += self.store.restart(t_us, first_us);
         self.heat.clear();
         self.until_search = 0;
     }

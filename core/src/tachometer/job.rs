@@ -2,6 +2,7 @@
 
 use heapless::Vec;
 
+use super::rhythm::NEVER;
 use super::{Job, Scratch, Suspect, Tachometer};
 use crate::limits::MAX_SUSPECTS;
 use crate::reading::{Reason, Status};
@@ -32,10 +33,11 @@ impl Tachometer<'_> {
         for found in self.tracker.known().iter().filter_map(Known::told) {
             suspect(&mut self.candidates, found);
         }
-        let beside = self.rhythm.searches_beside(self.until_search);
-        self.until_search -= 1;
-        if beside {
-            self.search();
+        if self.until_search != NEVER {
+            self.until_search -= 1;
+        }
+        if self.rhythm.searches_beside() {
+            self.search(Extraction::go_on(self.round));
         } else {
             self.measure_next(0);
         }
@@ -45,15 +47,14 @@ impl Tachometer<'_> {
     fn search_anew(&mut self) {
         self.until_search = self.rhythm.search_every;
         self.candidates.clear();
-        self.search();
+        self.search(Extraction::default());
     }
 
     /// Searches the image outside of what was measured, or is going to be.
     // Not inlined: it is called in three places.
     #[inline(never)]
-    fn search(&mut self) {
+    fn search(&mut self, mut extraction: Extraction) {
         self.scratch.ready_for_search();
-        let mut extraction = Extraction::default();
         for known in &self.candidates {
             extraction.leave_out(known.found.disc);
         }
@@ -88,6 +89,7 @@ impl Tachometer<'_> {
                 let Scratch::Search(scratch) = self.scratch else { return true };
                 if extraction.step(&mut view, self.polar, self.spectrum, scratch) {
                     self.in_step_hz = extraction.in_step_hz();
+                    self.round = extraction.round();
                     for candidate in extraction.candidates() {
                         suspect(&mut self.candidates, *candidate);
                     }

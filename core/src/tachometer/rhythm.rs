@@ -7,16 +7,19 @@ use crate::limits::DEVICE_EVENTS;
 pub(super) struct Rhythm {
     /// Segments that fill while a window is measured.
     pub spare: usize,
-    /// Readings until the whole image is searched again while rotors are followed.
+    /// Readings until the whole image is searched again while all rotors are followed, or [`NEVER`].
     pub search_every: u8,
-    /// Readings until what is beside them is searched in between.
-    beside_every: u8,
+    /// Readings until another part of what is beside them is searched, or [`NEVER`], and how many are left.
+    part_every: u8,
+    until_part: u8,
     /// Time by which the window moves on from reading to reading on average, as far as segments go, in microseconds.
     hop_us: u32,
     /// Part of that which the last hop left over.
     left_us: u32,
 }
 
+/// A number of readings that is never reached.
+pub(super) const NEVER: u8 = u8::MAX;
 /// Fewest segments by which the window moves on: 50 ms of a window of 150 ms.
 const LEAST_HOP: u32 = 2;
 /// Most, so that windows overlap.
@@ -25,20 +28,44 @@ const MOST_HOP: u32 = 4;
 impl Rhythm {
     /// The rhythm with room for so many events.
     ///
-    /// On the device a reading takes about 50 ms, beside the taking in of a million events a second, and a search many times as
-    /// long: eleven readings a second, and a search every five, leave it time.
+    /// On the device a reading takes about 50 ms, beside the taking in of a million events a second; a search of the whole image with
+    /// the first measurement behind it takes longer than the spare segments last. So, while all rotors are followed, only what is
+    /// beside them is searched, one part in every fourth reading: all of it, where nothing is found, in ten to twenty of them, four to
+    /// eight seconds. That leaves it time for eleven readings a second.
     pub const fn of(events: usize) -> Self {
-        let pc = Self { spare: 2, search_every: 10, beside_every: 10, hop_us: 50_000, left_us: 0 };
+        let pc = Self {
+            spare: 2,
+            search_every: 10,
+            part_every: NEVER,
+            until_part: NEVER,
+            hop_us: 50_000,
+            left_us: 0,
+        };
         if events > DEVICE_EVENTS {
             pc
         } else {
-            Self { spare: 4, search_every: 120, beside_every: 60, hop_us: 91_667, ..pc }
+            Self {
+                spare: 4,
+                search_every: NEVER,
+                part_every: 4,
+                until_part: 4,
+                hop_us: 91_667,
+                ..pc
+            }
         }
     }
 
-    /// Whether what is beside the rotors is searched, with so many readings left until the whole image is.
-    pub const fn searches_beside(&self, until_search: u8) -> bool {
-        until_search < self.search_every && until_search.is_multiple_of(self.beside_every)
+    /// Whether a part of what is beside the rotors is searched now, in one more reading of those that are followed.
+    pub const fn searches_beside(&mut self) -> bool {
+        if self.part_every == NEVER {
+            return false;
+        }
+        self.until_part -= 1;
+        let now = self.until_part == 0;
+        if now {
+            self.until_part = self.part_every;
+        }
+        now
     }
 
     /// Segments of `segment_us` microseconds by which the window moves on now.
@@ -78,11 +105,11 @@ mod tests {
     }
 
     #[test]
-    fn what_is_beside_is_searched_between_two_searches_of_the_whole() {
-        let device = Rhythm::of(DEVICE_EVENTS);
-        let beside = (1..=device.search_every).filter(|left| device.searches_beside(*left));
-        assert_eq!(beside.collect::<Vec<_>>(), [60]);
-        let pc = Rhythm::of(16 * DEVICE_EVENTS);
-        assert!((1..=pc.search_every).all(|left| !pc.searches_beside(left)));
+    fn what_is_beside_is_searched_in_every_fourth_reading_of_the_device() {
+        let mut device = Rhythm::of(DEVICE_EVENTS);
+        let beside = (1..=20).filter(|_| device.searches_beside());
+        assert_eq!(beside.collect::<Vec<_>>(), [4, 8, 12, 16, 20]);
+        let mut pc = Rhythm::of(16 * DEVICE_EVENTS);
+        assert!((1..=20).all(|_| !pc.searches_beside()));
     }
 }

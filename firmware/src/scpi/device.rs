@@ -41,11 +41,11 @@ pub struct View {
 /// What became of the events that the sensor sent since the start: each is counted once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Fate {
-    /// Taken in by the measurement.
+    /// Handed to the measurement, and not late.
     pub used: u64,
-    /// Left out evenly, because more waited to be measured.
+    /// Left out evenly before, because more waited to be measured, or by the camera, because it was told to.
     pub thinned: u64,
-    /// Left out, because they came while a window took too long to measure.
+    /// Handed to the measurement, and in no window that was measured: one took too long, or the stream broke off.
     pub late: u64,
     /// Lost by the sensor or the link.
     pub lost_before: u64,

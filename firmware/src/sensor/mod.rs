@@ -22,6 +22,8 @@ pub struct Standing {
     pub received: u64,
     /// Of these, left out evenly, because more waited to be measured.
     pub thinned: u64,
+    /// Events that did not come, because the sensor was told to leave out as many as it sends.
+    pub left_out: u64,
     /// Events that the sensor or the link lost.
     pub lost_before: u64,
     /// Events that came, and found no room.
@@ -36,6 +38,7 @@ impl Standing {
         latest_us: 0,
         received: 0,
         thinned: 0,
+        left_out: 0,
         lost_before: 0,
         overrun: 0,
     };
@@ -56,6 +59,7 @@ impl From<&spi::Acquired> for Standing {
             latest_us: *latest_us,
             received: account.received.saturating_sub(*overrun),
             thinned: *thinned,
+            left_out: 0,
             lost_before: account.lost.total(),
             overrun: *overrun,
         }
@@ -64,14 +68,15 @@ impl From<&spi::Acquired> for Standing {
 
 impl From<&usb::Acquired> for Standing {
     fn from(acquired: &usb::Acquired) -> Self {
-        let usb::Acquired { camera, trouble, latest_us, delivered, lost_by_camera, .. } = acquired;
+        let usb::Acquired { camera, trouble, latest_us, delivered, .. } = acquired;
         Self {
             geometry: camera.map(|camera| camera.geometry),
             trouble: *trouble,
             latest_us: *latest_us,
             received: delivered.received.saturating_sub(delivered.overrun),
             thinned: delivered.thinned,
-            lost_before: *lost_by_camera,
+            left_out: acquired.thinned_by_camera,
+            lost_before: acquired.lost_by_camera,
             overrun: delivered.overrun,
         }
     }

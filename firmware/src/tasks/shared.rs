@@ -56,7 +56,7 @@ pub struct Wanted {
 /// Everything between the tasks but the blocks of events.
 pub struct Shared {
     standing: Mutex<CriticalSectionRawMutex, Cell<Standing>>,
-    /// Events that came while a window was measured for too long.
+    /// Events that were handed on, but are in no window that was measured.
     late: Mutex<CriticalSectionRawMutex, Cell<u64>>,
     pub(super) readings: Channel<CriticalSectionRawMutex, Reading, READINGS>,
     pub(super) dropped: AtomicU32,
@@ -122,7 +122,7 @@ impl Shared {
         self.standing.lock(Cell::get)
     }
 
-    /// How many events were left out so far because a window took too long to measure: told by the measuring task.
+    /// How many events were handed on so far that are in no window that was measured: told by the measuring task.
     pub(super) fn tell_late(&self, events: u64) {
         self.late.lock(|cell| cell.set(events));
     }
@@ -130,12 +130,11 @@ impl Shared {
     /// What became of all events so far.
     #[must_use]
     pub(super) fn fate(&self) -> Fate {
-        let Standing { received, thinned, lost_before, overrun, .. } = self.standing();
-        // What came late is counted with what was thinned before, which each event stands for: that is counted once.
-        let came = received.saturating_sub(thinned);
-        let late = self.late.lock(Cell::get).min(came);
-        let used = came - late;
-        Fate { used, thinned, late, lost_before, overrun }
+        let Standing { received, thinned, left_out, lost_before, overrun, .. } = self.standing();
+        // Acquiring tells what it handed on a moment after measuring may have told what became of it.
+        let handed_on = received.saturating_sub(thinned);
+        let late = self.late.lock(Cell::get).min(handed_on);
+        Fate { used: handed_on - late, thinned: thinned + left_out, late, lost_before, overrun }
     }
 
     /// A task says that it is alive.
@@ -158,5 +157,36 @@ impl Shared {
     pub fn missing(&self) -> Option<Task> {
         let alive = self.alive.load(Ordering::Relaxed);
         Task::ALL.into_iter().find(|task| alive & *task as u32 == 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_event_has_one_fate() {
+        let shared = Shared::new();
+        let fate = |received, thinned, late| {
+            let (left_out, lost_before, overrun) = (50, 30, 4);
+            shared.tell(Standing {
+                received,
+                thinned,
+                left_out,
+                lost_before,
+                overrun,
+                ..Standing::NONE
+            });
+            shared.tell_late(late);
+            let Fate { used, thinned, late, lost_before, overrun } = shared.fate();
+            assert_eq!(used + thinned + late, received + left_out, "used, thinned or late");
+            assert_eq!((lost_before, overrun), (30, 4), "what was lost did not come");
+            (used, thinned, late)
+        };
+        assert_eq!(fate(0, 0, 0), (0, 50, 0));
+        assert_eq!(fate(1000, 600, 0), (400, 650, 0));
+        assert_eq!(fate(1000, 600, 150), (250, 650, 150));
+        // Told before what came was.
+        assert_eq!(fate(1000, 600, 410), (0, 650, 400));
     }
 }

@@ -28,6 +28,10 @@ pub struct How {
     /// One standard deviation of the camera clock's error.
     #[arg(long, value_name = "PPM", default_value_t = 15.0)]
     pub clock_ppm: f32,
+    /// One standard deviation of the gyro's zero-rate offset; 0.003 where it was calibrated on a still camera. Unless stated, that of
+    /// data sheets.
+    #[arg(long, value_name = "RAD/S", value_parser = parse_sigma)]
+    gyro_sigma: Option<f32>,
 }
 
 impl How {
@@ -49,8 +53,17 @@ impl How {
         settings.blades = self.blades;
         settings.window_us = self.window_ms.map(|ms| ms * 1000);
         settings.clock_sigma_ppm = self.clock_ppm;
+        if let Some(sigma_rad_s) = self.gyro_sigma {
+            settings.gyro_sigma_rad_s = sigma_rad_s;
+        }
         settings
     }
+}
+
+/// A standard deviation, which is a number and not negative.
+fn parse_sigma(text: &str) -> Result<f32, String> {
+    let sigma = text.parse().ok().filter(|sigma: &f32| sigma.is_finite() && *sigma >= 0.0);
+    sigma.ok_or_else(|| format!("\"{text}\" is no error bar; write a number from 0 on, as 0.003"))
 }
 
 /// A region as people write it: x,y,width,height in pixels.
@@ -67,6 +80,14 @@ pub fn parse_roi(text: &str) -> Result<Roi, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn error_bars_are_checked() {
+        assert_eq!(parse_sigma("0.003"), Ok(0.003));
+        for text in ["", "-1", "nan", "inf", "a"] {
+            assert!(parse_sigma(text).is_err(), "{text}");
+        }
+    }
 
     #[test]
     fn regions_are_checked() {

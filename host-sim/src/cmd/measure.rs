@@ -34,8 +34,8 @@ pub struct Args {
     end: Option<f64>,
     /// Take the camera's own roll out of the speed by the recording's gyro, where it has one.
     ///
-    /// The gyro's offset should have been calibrated away; its axes are those of the cameras' documentation, not yet
-    /// checked against a recording of a rolling camera.
+    /// The gyro's offset is found while measuring, in some seconds from the hand; --gyro-sigma tells how well it is known before. Its
+    /// axes are those of the cameras' documentation, not yet checked against a recording of a rolling camera.
     #[arg(long)]
     gyro: bool,
     /// Show what each stage found, and why something was refused.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use evtach_core::{Reading, Speed};
+use evtach_core::{Frame, Reading, Speed};
 
 /// Windows that touch overlap by no more than what their middles are rounded by, in microseconds.
 const TOUCH_US: u64 = 2;
@@ -96,17 +96,22 @@ fn weighted_mean(pieces: &[Piece], of: impl Fn(&Piece) -> f64) -> f64 {
 /// What they leave open is filled in from the line through all and the reading next to it, each as far as it is
 /// known, and is as uncertain as readings scatter about that line.
 pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) -> Option<Speed> {
-    let first = pieces.first()?;
+    pieces.first()?;
     let line = Line::through(pieces, span_us.start);
     let off = |piece: &Piece| piece.omega_rad_s() - line.at(piece.middle_us());
     let scatter = weighted_mean(pieces, |p| off(p).powi(2));
 
     let clock = (f64::from(clock_sigma_ppm) * 1e-6 * line.mean_rad_s).powi(2);
-    let (mut whole_s, mut turn_rad, mut turn_variance) = (0.0, 0.0, 0.0);
-    let mut add = |length_s: f64, omega_rad_s: f64, variance: f64| {
+    let (mut whole_s, mut turn_rad, mut turn_variance, mut by_gyro) = (0.0, 0.0, 0.0, 0.0);
+    let mut add = |length_s: f64, omega_rad_s: f64, variance: f64, frame: Frame| {
         whole_s += length_s;
         turn_rad += length_s * omega_rad_s;
-        turn_variance += length_s * length_s * (variance - clock).max(0.0);
+        let variance = (variance - clock).max(0.0);
+        match frame {
+            Frame::Camera => turn_variance += length_s * length_s * variance,
+            // What is left of a gyro's offset is in all of them alike.
+            Frame::Room => by_gyro += length_s * variance.sqrt(),
+        }
     };
     let mut reached_us = span_us.start;
     let tiles = tiles(pieces);
@@ -121,19 +126,22 @@ pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) 
             // How much of what the next reading is off by the line is the speed's, and not its own error.
             let own = scatter / (scatter + near.variance()).max(f64::from(f32::MIN_POSITIVE));
             let variance = scatter + own * near.variance() + moved;
-            add(length_s, line.at(middle_us) + own * off(near), variance);
+            add(length_s, line.at(middle_us) + own * off(near), variance, near.speed.frame);
         }
         if let Some(tile) = tile {
-            add(tile.length_us() as f64 * 1e-6, tile.omega_rad_s(), tile.variance());
+            let length_s = tile.length_us() as f64 * 1e-6;
+            add(length_s, tile.omega_rad_s(), tile.variance(), tile.speed.frame);
         }
         reached_us = window_us.end;
     }
+    let turn_variance = turn_variance + by_gyro * by_gyro;
     let sigma_rad_s = (turn_variance / (whole_s * whole_s) + clock).sqrt();
+    let in_room = pieces.iter().all(|piece| piece.speed.frame == Frame::Room);
     Some(Speed {
         omega_rad_s: (turn_rad / whole_s) as f32,
         omega_sigma_rad_s: sigma_rad_s as f32,
         alpha_rad_s2: line.slope_rad_s2.map(|slope| slope as f32),
-        frame: first.speed.frame,
+        frame: if in_room { Frame::Room } else { Frame::Camera },
     })
 }
 
@@ -237,6 +245,32 @@ mod tests {
         let turn_rad = |t: f64| 230.0 * t + 5.0 * t * t;
         let (mean_rad_s, _) = mean(turn_rad, 640);
         assert!((mean_rad_s - turn_rad(0.64) / 0.64).abs() < 1e-3, "{mean_rad_s}");
+    }
+
+    #[test]
+    fn what_is_left_of_a_gyros_offset_does_not_average_out() {
+        let told = |frames: [Frame; 3]| {
+            let pieces: Vec<Piece> = (0..)
+                .zip(frames)
+                .map(|(i, frame)| {
+                    let speed = Speed {
+                        omega_rad_s: 200.0,
+                        omega_sigma_rad_s: 0.03,
+                        alpha_rad_s2: None,
+                        frame,
+                    };
+                    Piece { window_us: i * 150_000..(i + 1) * 150_000, speed }
+                })
+                .collect();
+            let mean = mean_speed(&pieces, &(0..450_000), 0.0).expect("readings");
+            ((1e3 * mean.omega_sigma_rad_s).round(), mean.frame)
+        };
+        let (camera, room) = (Frame::Camera, Frame::Room);
+        assert_eq!(told([camera; 3]), (17.0, camera));
+        assert_eq!(told([room; 3]), (30.0, room));
+        // Until the offset was known they were told to the camera.
+        assert_eq!(told([camera, camera, room]), (17.0, camera));
+        assert_eq!(told([camera, room, room]), (22.0, camera));
     }
 
     #[test]

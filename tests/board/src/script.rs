@@ -122,7 +122,12 @@ impl Script {
             "run_until" => self.run_until(ps(rest)?)?,
             "plug" => self.plug(rest)?,
             "firmware" => self.firmware = Some(number(rest)?),
-            "roll" => self.roll_rad_s = number(rest)?,
+            "roll" => {
+                self.roll_rad_s = number(rest)?;
+                if let Some(camera) = &self.camera {
+                    camera.borrow_mut().roll_rad_s = self.roll_rad_s;
+                }
+            }
             "repeat" => self.repeat_us = Some(ps(rest)? / crate::time::US),
             "cover" => {
                 let camera = self.camera.as_ref().ok_or_else(|| anyhow!("there is no camera"))?;
@@ -271,6 +276,7 @@ impl Script {
             "model": camera.model.name(),
             "seen": camera.seen,
             "filtered": camera.filtered,
+            "skipped": camera.skipped,
             "dropped": camera.dropped,
             "waiting_bytes": camera.waiting_bytes(),
             "done": camera.is_done(),

@@ -1,9 +1,9 @@
 //! What a camera at the port sees, read by the device: the PC's readings to the bit, and the PC's screen to the pixel.
 
-use evtach_core::decode::{Davis, Dvxplorer, Mounting};
-use evtach_core::{Event, Frame, GyroSample, Reading, Settings};
+use evtach_core::decode::{Dvxplorer, Mounting};
+use evtach_core::{Event, Reading, Settings};
 use evtach_firmware::instrument::{Instrument, Picture, Preferences, Sensor, Traffic};
-use evtach_firmware::sensor::usb::emulated::{DavisWords, DvxplorerWords, GyroRange};
+use evtach_firmware::sensor::usb::emulated::DvxplorerWords;
 use evtach_host::measure::{Capacity, ReadingRow, drain, measure_events, with_tachometer};
 use evtach_host::synth::{Rotor, Scene};
 use evtach_tests::{Loaded, load, recordings, show};
@@ -49,51 +49,19 @@ fn as_sent(camera: Camera, sees: &Loaded) -> Loaded {
     Loaded { events, geometry: sees.geometry }
 }
 
-/// What the gyro of a camera says that rolls so fast all the while, to the steps that it counts in.
-fn rolling(camera: Camera, roll_rad_s: f32, lasts_us: u64) -> Vec<GyroSample> {
-    let said = GyroSample { t_us: 0, roll_rad_s };
-    let (mut words, mounting) = (Vec::new(), Mounting::default());
-    let (every_us, heard) = match camera {
-        Camera::Davis346 => {
-            DavisWords::default().gyro(&said, GyroRange::davis346(1), &mut words);
-            let mut decoder = Davis::new(mounting);
-            (1_000, words.iter().find_map(|word| decoder.decode(*word, |_| {})))
-        }
-        Camera::Dvxplorer => {
-            DvxplorerWords::default().gyro(&said, GyroRange::dvxplorer(2), &mut words);
-            let mut decoder = Dvxplorer::new(mounting);
-            (1_250, words.iter().find_map(|word| decoder.decode(*word, |_| {})))
-        }
-    };
-    let roll_rad_s = heard.expect("a sample").roll_rad_s;
-    (0..=lasts_us).step_by(every_us).map(|t_us| GyroSample { t_us, roll_rad_s }).collect()
-}
-
 impl Twin {
     /// Sees what the camera sends of this, measures it, and hears nothing more for so long.
-    fn new(
-        (camera, roll_rad_s): (Camera, f32),
-        sees: &Loaded,
-        window_us: Option<u32>,
-        silent_us: u64,
-    ) -> Self {
+    fn new(camera: Camera, sees: &Loaded, window_us: Option<u32>, silent_us: u64) -> Self {
         let sent = as_sent(camera, sees);
         let settings = Settings { window_us, ..Settings::new(sent.geometry) };
         let lasts_us = sent.events.last().map_or(0, |event| event.t_us);
-        let gyro = rolling(camera, roll_rad_s, lasts_us);
         let mut instrument = Instrument::new(Preferences::default());
         instrument.set_sensor(Sensor::Present);
         let traffic = Traffic { events: sent.events.len() as u64, lost: 0 };
         instrument.tick(lasts_us, traffic);
         let mut readings = Vec::new();
         with_tachometer(settings, Capacity::Device, |tachometer| {
-            let mut gyro = &gyro[..];
-            for stretch in sent.events.chunk_by(|a, b| a.t_us / 1000 == b.t_us / 1000) {
-                let reached = gyro.partition_point(|sample| sample.t_us <= stretch[0].t_us);
-                gyro[..reached].iter().for_each(|sample| tachometer.gyro(*sample));
-                gyro = &gyro[reached..];
-                tachometer.push(stretch);
-            }
+            tachometer.push(&sent.events);
             drain(tachometer, |reading| readings.push(reading));
             let mut picture = Picture::EMPTY;
             picture.take(tachometer.heat());
@@ -101,7 +69,7 @@ impl Twin {
         });
         readings.iter().for_each(|reading| instrument.observe(reading));
         instrument.tick(lasts_us + silent_us, traffic);
-        let (measured, _) = measure_events(&sent.events, &gyro, settings, Capacity::Device);
+        let (measured, _) = measure_events(&sent.events, &[], settings, Capacity::Device);
         let row = |reading: &Reading| ReadingRow::new(reading, 0);
         assert_eq!(
             readings.first().map(row),
@@ -116,29 +84,18 @@ impl Twin {
 /// the fewest digits that give it again), and its panel shows what the PC draws, to the last pixel.
 fn assert_reads_and_shows_as_the_pc(
     camera: Camera,
-    sees: Loaded,
-    window_ms: Option<u32>,
-    wanted: Option<(usize, &str)>,
-) {
-    read_and_shown(camera, 0.0, sees, window_ms, wanted);
-}
-
-/// The same from a camera that rolls so fast all the while; returns the reading, where there is a board.
-fn read_and_shown(
-    camera: Camera,
-    roll_rad_s: f32,
     mut sees: Loaded,
     window_ms: Option<u32>,
     wanted: Option<(usize, &str)>,
-) -> Option<Reading> {
-    let mut board = Board::switch_on()?;
+) {
+    let Some(mut board) = Board::switch_on() else { return };
     let window_us = window_ms.map(|ms| ms * 1000);
     let until_us = window_us.map_or(WINDOW_US, u64::from) + BEHIND_US;
     assert!(sees.events.last().is_some_and(|last| last.t_us >= until_us - BEHIND_US), "too short");
     sees.events.retain(|event| event.t_us < until_us);
     // For longer than a rate is told over; a refusal of what ended so early gives way to the silence before it is drawn.
     let silent_us = if wanted.is_some() { 300_000 } else { 1_500_000 };
-    let twin = Twin::new((camera, roll_rad_s), &sees, window_us, silent_us);
+    let twin = Twin::new(camera, &sees, window_us, silent_us);
     let [reading] = &twin.readings[..] else { unreachable!("{:#?}", twin.readings) };
     let found = (reading.rotors.len(), reading.status.as_str());
     assert_eq!(wanted.unwrap_or(found), found, "{reading:?}");
@@ -148,7 +105,6 @@ fn read_and_shown(
         board.query(&format!("WIND {ms} MS;WIND?"));
     }
     board.serial("SYST:LOG ON");
-    board.break_(&format!("roll {roll_rad_s}"));
     board.plug_camera(camera, &sees);
     let shown = drawn(&twin.instrument);
     let (mut said, mut wrong, mut took_s) = (String::new(), usize::MAX, 0.0);
@@ -188,38 +144,64 @@ fn read_and_shown(
         "pixels that differ from the PC's, see device.png and pc.png in the folder for what is temporary"
     );
     board.assert_sound();
-    Some(reading.clone())
 }
 
+/// A hand holds the camera, and its gyro is off by as much as gyros are: after some seconds the speed is that in the room.
 #[test]
-fn a_camera_that_rolls_tells_the_speed_in_the_room() {
-    const ROLL_RAD_S: f32 = 0.3;
+fn a_gyro_tells_the_speed_in_the_room_once_its_offset_is_found() {
+    const OFFSET_RAD_S: f64 = 0.02;
+    const ROLL_RAD_S: f64 = 0.3;
     const RPM: f64 = 600.0;
-    for (camera, geometry) in [(Camera::Davis346, DAVIS346), (Camera::Dvxplorer, DVXPLORER)] {
-        let (x_px, y_px) =
-            (f64::from(geometry.width_px) / 2.0, f64::from(geometry.height_px) / 2.0);
-        let rotor = Rotor { rpm: RPM, radius_px: 22.0, blades: 3, x_px, y_px, ..Rotor::default() };
+    const RPM_PER_RAD_S: f64 = 30.0 / std::f64::consts::PI;
+    for (camera, pixels) in [(Camera::Davis346, DAVIS346), (Camera::Dvxplorer, DVXPLORER)] {
+        let Some(mut board) = Board::switch_on() else { return };
+        let (x_px, y_px) = (f64::from(pixels.width_px) / 2.0, f64::from(pixels.height_px) / 2.0);
+        let rotor = Rotor { rpm: RPM, radius_px: 22.0, x_px, y_px, ..Rotor::default() };
         let mut scene = Scene {
-            width_px: geometry.width_px,
-            height_px: geometry.height_px,
+            width_px: pixels.width_px,
+            height_px: pixels.height_px,
             rotors: vec![rotor],
-            duration_ms: 510.0,
+            duration_ms: 12_500.0,
             ..Scene::default()
         };
-        // A quick search: the reading is told before the silence behind the window is.
         scene.sensor.noise_hz = 0.0;
-        scene.camera.roll_rad_s = ROLL_RAD_S.into();
-        // The hand that rolls it moves it as well, so that the gyro is the better witness.
-        scene.camera.drift_px_s = [30.0, -10.0];
-        let sees = synthesise(&scene);
-        let wanted = Some((1, "locked"));
-        let Some(reading) = read_and_shown(camera, ROLL_RAD_S, sees, Some(500), wanted) else {
-            return;
+        // A hand that shifts the picture, and does not turn it: all that the gyro tells is its offset.
+        scene.camera.tremor_px = 3.0;
+        board.run(0.5);
+        board.serial("SYST:LOG ON");
+        board.break_(&format!("roll {OFFSET_RAD_S}"));
+        board.plug_camera(camera, &synthesise(&scene));
+        // How far off, sigma, and relative to what.
+        let told = |board: &mut Board, seconds: usize| {
+            let mut said = String::new();
+            for _ in 0..4 * seconds {
+                board.run(0.25);
+                said.push_str(&board.read());
+            }
+            let rows = said.lines().filter_map(|line| serde_json::from_str(line).ok());
+            let of = |row: ReadingRow| {
+                let rotor = row.rotors.first()?.clone();
+                Some((rotor.rpm? - RPM, rotor.rpm_sigma?, rotor.frame?.into_owned()))
+            };
+            rows.filter_map(of).collect::<Vec<_>>()
         };
-        let speed = reading.rotors.first().and_then(|rotor| rotor.speed).expect("a speed");
-        assert_eq!(speed.frame, Frame::Room, "{camera:?}");
-        // The roll is 2.9 rpm.
-        assert!((f64::from(speed.rpm()) - RPM).abs() < 0.3, "{camera:?}: {reading:?}");
+        let held = told(&mut board, 11);
+        let [first, .., last] = &held[..] else { unreachable!("{camera:?}: {held:?}") };
+        show(&format!("{camera:?}: first {first:?}, after eleven seconds {last:?}"));
+        assert_eq!((&*first.2, &*last.2), ("camera", "room"), "{camera:?}");
+        for (off, sigma, frame) in &held {
+            assert!(off.abs() < 4.0 * sigma, "{camera:?}: {off} +/- {sigma} to the {frame}");
+        }
+        // With the offset in it, that would be 0.19 rpm.
+        let end = &held[held.len() - 20..];
+        let off = end.iter().map(|(off, ..)| off).sum::<f64>() / end.len() as f64;
+        assert!(off.abs() < 0.5 * OFFSET_RAD_S * RPM_PER_RAD_S, "{camera:?}: {off}");
+        // Now it says that the camera turns, clockwise in the picture as the rotor does: so that turns more slowly in the room.
+        board.break_(&format!("roll {}", OFFSET_RAD_S + ROLL_RAD_S));
+        let turned = told(&mut board, 1);
+        let (off, ..) = turned.last().expect("a reading");
+        assert!((off + ROLL_RAD_S * RPM_PER_RAD_S).abs() < 0.5, "{camera:?}: {turned:?}");
+        board.assert_sound();
     }
 }
 
@@ -297,26 +279,28 @@ fn one_rotor_before_a_dvxplorer() {
     );
 }
 
+/// The real spinning dot, its middle moved to where the camera's pixels are, and what lies beside these left out.
 #[test]
 fn the_real_spinning_dot() {
+    let pixels = DAVIS346;
     let Some(folder) = recordings("real") else { return };
     let dot = load(&folder.join("spinning-dot.evt2.raw")).expect("a recording");
-    // Its middle, moved to where the camera's pixels are.
-    let half = |wide: u16, narrow: u16| wide.saturating_sub(narrow) / 2;
+    let half = |wide: u16, narrow: u16| (i32::from(wide) - i32::from(narrow)) / 2;
     let (left, top) = (
-        half(dot.geometry.width_px, DAVIS346.width_px),
-        half(dot.geometry.height_px, DAVIS346.height_px),
+        half(dot.geometry.width_px, pixels.width_px),
+        half(dot.geometry.height_px, pixels.height_px),
     );
     let events = dot.events.iter().filter_map(|event| {
-        let (x, y) = (event.x.checked_sub(left)?, event.y.checked_sub(top)?);
-        DAVIS346.contains(x, y).then_some(Event { x, y, ..*event })
+        let x = u16::try_from(i32::from(event.x) - left).ok()?;
+        let y = u16::try_from(i32::from(event.y) - top).ok()?;
+        pixels.contains(x, y).then_some(Event { x, y, ..*event })
     });
     let events = from_zero(events.collect());
     // Nine million events a second, more than the port carries: every so many, as the camera's own skipping would have it.
     let per_s =
         events.len() as u64 * 1_000_000 / events.last().map_or(1, |event| event.t_us.max(1));
     let every = usize::try_from(per_s.div_ceil(300_000)).unwrap_or(usize::MAX);
-    let sees = Loaded { geometry: DAVIS346, events: events.into_iter().step_by(every).collect() };
+    let sees = Loaded { geometry: pixels, events: events.into_iter().step_by(every).collect() };
     // It lasts 50 ms, less than a turn, of which so few events are left that the PC may refuse it; then so does the device.
     assert_reads_and_shows_as_the_pc(Camera::Davis346, sees, Some(40), None);
 }

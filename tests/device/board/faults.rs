@@ -136,11 +136,17 @@ fn far_more_events_than_the_port_carries() {
     assert!(counted("filtered") > counted("seen") / 3, "{camera}");
     assert!(counted("dropped") < counted("seen") / 4, "{camera}");
     let fate = board.query("SYST:EVEN?");
-    let told: u64 = fate.split(',').filter_map(|count| count.parse::<u64>().ok()).sum();
+    let fates: Vec<u64> = fate.split(',').filter_map(|count| count.parse().ok()).collect();
+    let [used, thinned, late, lost_before, overrun] = fates[..] else { unreachable!("{fate}") };
     evtach_tests::show(&format!("a flood: {read}; {fate}; {camera}"));
-    // What is skipped by order is told as thinned, what is outside the region is not.
-    let all = counted("seen") - counted("filtered")..=counted("seen");
-    assert!(all.contains(&told), "{told}, {fate}; {camera}");
+    // What the camera skips by order it does not count: as many as come, give or take the transfers under way when it is told
+    // to. Nor what is outside of the region, and nobody else does.
+    let outside = counted("filtered") - counted("skipped");
+    let told = used + thinned + late + lost_before + overrun;
+    let all = counted("seen") - outside;
+    assert!(told.abs_diff(all) < all / 50, "{told} of {all}, {fate}; {camera}");
+    assert!(used > 100_000, "{fate}; {camera}");
+    assert_eq!(lost_before, counted("dropped"), "{fate}; {camera}");
     board.assert_sound();
 }
 

@@ -44,9 +44,17 @@ impl Extraction {
             if self.taken.is_full() {
                 return self.end();
             }
+            if self.looked {
+                return self.done();
+            }
             if self.grid.is_empty() {
-                self.grid = self.cells_of(view, self.least_log2);
-                self.finer = false;
+                let left_log2 = core::mem::take(&mut self.cell_log2);
+                self.finer &= left_log2 > 0;
+                let cell_log2 = if left_log2 > 0 { left_log2 } else { self.least_log2 };
+                self.grid = self.cells_of(view, cell_log2);
+                while self.grid.cell_log2 < left_log2 {
+                    self.grid = self.grid.coarser();
+                }
             }
             return self.start_filling(scratch);
         };
@@ -67,16 +75,26 @@ impl Extraction {
             // Many small blades pass side by side.
             self.finer = true;
             self.grid = self.cells_of(view, self.grid.cell_log2 - 1);
-            return;
+            return self.other_cells();
         }
         if self.quarter == 0 {
             let crowded = events > VISITS / 4 * 3 || self.grid.cell_log2 == COARSEST_LOG2;
             let least_log2 = self.grid.cell_log2.saturating_sub(u8::from(crowded)).max(2);
-            let first = self.taken.is_empty();
+            let first = self.least_log2 == 0;
             self.least_log2 = if first { least_log2 } else { least_log2.min(self.least_log2) };
         }
         spectrum.clear();
         self.stage = Stage::Lags;
+    }
+
+    /// Collects once more, in other cells; a search in parts does so next time.
+    // Nor this, in three.
+    #[inline(never)]
+    fn other_cells(&mut self) {
+        self.stage = Stage::Visits;
+        if self.in_parts {
+            self.done();
+        }
     }
 
     pub(super) fn start_filling(&mut self, scratch: &mut Scratch) {
@@ -111,10 +129,13 @@ impl Extraction {
             return;
         }
         self.lines.reverse();
+        self.leave_out_lines();
         self.stage = Stage::Line;
     }
 
     /// Cells of at least this size for what is searched.
+    // Not inlined: it is called in two places.
+    #[inline(never)]
     pub(super) fn cells_of(&self, view: &View<'_>, cell_log2: u8) -> CellGrid {
         let Some(number) = self.quarter.checked_sub(1) else { return view.grid };
         let CellGrid { columns, rows, .. } = view.grid;
@@ -145,6 +166,9 @@ impl Extraction {
         self.quarter_looks = 0;
         self.grid = CellGrid::default();
         self.stage = Stage::Visits;
+        if self.in_parts {
+            self.done();
+        }
     }
 
     /// Takes the next line up.
@@ -167,6 +191,10 @@ impl Extraction {
         if self.quarter > 0 && self.quarter_looks == LOOKS_A_QUARTER {
             return self.next_quarter();
         }
+        if self.looked {
+            return self.done();
+        }
+        self.looked = self.in_parts;
         self.looks += 1;
         self.quarter_looks += 1;
         self.tried.push(line).ok();

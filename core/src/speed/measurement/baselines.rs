@@ -112,16 +112,18 @@ impl Measurement {
     }
 
     /// Plans the lock at the longest baseline that cannot slip a period while the speed is known to `sigma_rad_s`.
+    // Not inlined: it is called in three places.
+    #[inline(never)]
     pub(super) fn plan_lock(&mut self, window: &Window<'_>, sigma_rad_s: f32) {
         let pace = self.pace();
         let periods = window.duration_us as f32 / pace.period_us();
         let safe = SAFE_SLIP * pace.omega_rad_s.abs() / (3.0 * sigma_rad_s);
         let longest = LOCK_SHARE * periods;
-        let mut m = libm::floorf(longest.min(safe)).max(1.0);
+        let mut m = crate::math::floor(longest.min(safe)).max(1.0);
         // Where the parts differ, only a whole revolution brings back the same picture.
         let parts = pace.parts as f32;
         if !self.alike && m >= parts {
-            m = libm::floorf(m / parts) * parts;
+            m = crate::math::floor(m / parts) * parts;
         }
         let effort = if self.follows {
             FOLLOWING

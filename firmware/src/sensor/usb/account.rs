@@ -31,7 +31,7 @@ pub struct Acquired {
     /// Events that came, and what became of them here.
     pub delivered: Delivered,
     /// Events that the camera left out because it was told to send fewer. It tells no number: it leaves out one for
-    /// each that comes while [`Limit::skips`]. What lies outside of a region is not known.
+    /// each that comes, or that it loses, while [`Limit::skips`]. What lies outside of a region is not known.
     pub thinned_by_camera: u64,
     /// Events that the camera lost because its FIFO was full, by its own counter; a camera without counters tells none.
     pub lost_by_camera: u64,

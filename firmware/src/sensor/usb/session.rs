@@ -190,6 +190,9 @@ where
             let lost = dropped.checked_sub(before).unwrap_or(dropped);
             acquired.lost_by_camera += lost;
             outlet.lost += lost;
+            if acquired.limit.skips {
+                acquired.thinned_by_camera += lost;
+            }
         }
         let events = arrived(outlet, acquired);
         if let Some(limit) = self.governor.update(now, events) {

@@ -139,6 +139,7 @@ fn measure(job: &Job) -> anyhow::Result<Vec<(Key, Sample)>> {
                     continue;
                 }
                 let mut settings = Settings::new(geometry);
+                settings.gyro_sigma_rad_s = spec::GYRO_SIGMA_RAD_S;
                 let events: &[Event] = match window {
                     Window::Adaptive => &made.events,
                     Window::Paper => {

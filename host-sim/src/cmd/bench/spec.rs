@@ -139,6 +139,9 @@ pub fn quad(model: Model, seed: u64) -> Scene {
     scene
 }
 
+/// One standard deviation of the offset that such a gyro is taken to have, in rad/s.
+pub const GYRO_SIGMA_RAD_S: f32 = 3e-3;
+
 /// A gyro whose zero was taken at rest: a small offset remains.
 pub fn gyro(rng: &mut Pcg64Mcg) -> Gyro {
     Gyro { offset_rad_s: rng.random_range(-1e-3..1e-3), ..Gyro::default() }

@@ -177,8 +177,9 @@ fn measure(number: u64) -> anyhow::Result<Trial> {
     };
     let owed: Vec<bool> =
         (0..scene.rotors.len()).map(|i| owed(&scene, made.truth.rotors[i].events, i)).collect();
+    let settings = Settings { gyro_sigma_rad_s: spec::GYRO_SIGMA_RAD_S, ..Settings::new(geometry) };
     let results = Capacity::ALL.iter().map(|&capacity| {
-        let series = readings(&made.events, &made.gyro, Settings::new(geometry), capacity);
+        let series = readings(&made.events, &made.gyro, settings, capacity);
         outcome(&scene, &motion, &series, &owed, capacity)
     });
     Ok(Trial { trial: number, rotors: scene.rotors.len(), results: results.collect() })

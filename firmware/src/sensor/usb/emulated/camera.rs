@@ -72,6 +72,8 @@ pub struct Camera {
     pub seen: u64,
     /// Events left out by its filters.
     pub filtered: u64,
+    /// Of these, skipped though they were in the region.
+    pub skipped: u64,
     /// Events dropped, because the FIFO was full.
     pub dropped: u64,
     /// What the gyro measures all the while, in rad/s.
@@ -129,6 +131,7 @@ impl Camera {
             log: Vec::new(),
             seen: 0,
             filtered: 0,
+            skipped: 0,
             dropped: 0,
             roll_rad_s: 0.0,
             registers: BTreeMap::from(registers),
@@ -368,6 +371,7 @@ impl Camera {
         });
         if outside || skipped {
             self.filtered += 1;
+            self.skipped += u64::from(!outside);
         } else if self.fifo.len() + 16 > FIFO_BYTES {
             self.dropped += 1;
         } else {
