@@ -36,6 +36,7 @@ pub const BASE_WINDOW_US: u32 = 150_000;
 pub const LONGEST_WINDOW_US: u32 = 2_000_000;
 
 #[derive(Debug, Default)]
+#[allow(clippy::large_enum_variant, reason = "one job at a time, and no heap to put the larger on")]
 enum Job {
     #[default]
     Idle,

@@ -57,6 +57,7 @@ pub fn believe(explainer: &Explainer, line_hz: f32) -> Option<Found> {
         line_hz,
         share,
         explained: share * region.iter().map(|p| p.amplitude).sum::<f32>() * thinned,
+        ..Found::default()
     })
 }
 

@@ -32,6 +32,7 @@ use super::winding::Explainer;
 use crate::limits::{MAX_CANDIDATES, MAX_CLUSTERS, MAX_LINES, MAX_ROTORS};
 use crate::order::sort_few;
 use crate::speed::polar::PolarTrack;
+use crate::speed::pose::Tilt;
 use crate::store::{Even, Window};
 
 /// Share of a rotor's radius that it is thought to cover: beyond it blades may have been cut off by the cells.
@@ -52,6 +53,8 @@ pub struct Found {
     pub share: f32,
     /// Events in step that it explains.
     pub explained: f32,
+    /// How it is tilted, once that was asked.
+    pub tilt: Option<Tilt>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -9,7 +9,7 @@ use super::angular::AngularSums;
 use super::baseline::{Estimate, Pairs};
 use super::initial::{Ladder, Rates};
 use super::polar::{PolarTrack, track};
-use super::pose::{Pose, Sums};
+use super::pose::{Pose, Sums, Tilt};
 use crate::math::TAU;
 use crate::reading::{Evidence, Frame, Reason, Speed, Status};
 use crate::registration::Icp;
@@ -19,6 +19,8 @@ use doubt::Doubt;
 
 /// Standard errors that an acceleration stands out by.
 const ACCELERATION_SIGMAS: f32 = 4.0;
+/// Fewest equal parts that tell a tilt from an uneven turn.
+const TILTED_PARTS: u8 = 3;
 /// Relative error of the speed of a rotor that is followed from window to window.
 const FOLLOWING_SIGMA: f32 = 1e-3;
 /// Fewest events of a rotor that are measured.
@@ -93,6 +95,7 @@ pub struct Measurement {
     omega_rad_s: f32,
     /// Angular harmonic whose phase is followed.
     harmonic: u32,
+    tilt: Option<Tilt>,
     pose: Pose,
     /// Frequency and angular harmonic of the line that the rotor was found by.
     line_hz: f32,
@@ -129,6 +132,7 @@ impl Measurement {
             omega_rad_s: found.omega_rad_s,
             harmonic: found.windings,
             pose: Pose::new(found.disc, found.omega_rad_s, 1, found.windings, 0),
+            tilt: found.tilt,
             line_hz: found.line_hz,
             windings: found.windings,
             events: 0,
@@ -242,7 +246,10 @@ impl Measurement {
             let pose =
                 Pose::new(self.disc, self.omega_rad_s, parts, self.harmonic, window.duration_us);
             let pose = if self.alike { pose } else { pose.unlike(self.parts.unwrap_or(1)) };
-            self.pose = if self.follows { pose.known() } else { pose };
+            let tells = self.parts.is_some_and(|parts| parts >= TILTED_PARTS) && !self.doubted();
+            let known = self.follows && (self.tilt.is_some() || !tells);
+            let pose = if tells { pose.tilted(self.tilt.unwrap_or_default()) } else { pose };
+            self.pose = if known { pose.known() } else { pose };
         }
         if !self.pose.step(window, sums, even) {
             return;
@@ -302,6 +309,7 @@ impl Measurement {
                     self.harmonic
                 },
                 line_hz: self.line_hz,
+                tilt: self.pose.tilt(),
                 ..Found::default()
             },
             parts: self.parts,

@@ -13,6 +13,7 @@
 mod blocks;
 mod schedule;
 mod template;
+mod tilt;
 
 use heapless::Vec;
 
@@ -31,6 +32,8 @@ use blocks::{
 };
 use schedule::{Phase, Schedule};
 use template::{BANKS, Counts, RINGS, Template};
+pub use tilt::Tilt;
+use tilt::TiltSums;
 
 /// Events that a block should hold.
 const BLOCK_EVENTS: usize = 32;
@@ -46,6 +49,8 @@ const FOLDED_PERIODS: usize = 3;
 const MOST_HARMONIC: u32 = 96;
 /// A doubled harmonic must keep this share of the events in step that were so at first.
 const SHARP_COHERENCE: f32 = 0.5;
+/// The same where blocks hold few events: a path that went astray at a sparse end does not find back to a harmonic so fine.
+const SPARSE_COHERENCE: f32 = 0.7;
 /// Blocks over which the wandering of the axis is judged.
 const DRIFT_BLOCKS: usize = 12;
 
@@ -70,6 +75,7 @@ pub struct Sums {
     /// At the harmonic that is followed, and at twice it.
     low: Template,
     high: Template,
+    tilt: TiltSums,
 }
 
 impl Sums {
@@ -79,6 +85,7 @@ impl Sums {
         counts: [0; BANKS],
         low: Template::EMPTY,
         high: Template::EMPTY,
+        tilt: TiltSums::EMPTY,
     };
 
     /// Share of the events in step with the template of the round before.
@@ -105,10 +112,13 @@ pub struct Pose {
     /// Parts that have a template of their own.
     sectors: u32,
     walk_px: f32,
+    tilt: Tilt,
+    /// Whether the tilt is asked for.
+    tilts: bool,
     path: Path,
     /// Blocks in a symmetry period, 0 when blocks are whole periods.
     in_period: usize,
-    phases: Option<[(f32, f32); BANKS]>,
+    phases: Option<[(f32, f32, f32); BANKS]>,
     coherence: f32,
     /// The same before the harmonic was raised.
     first_coherence: f32,
@@ -146,6 +156,8 @@ impl Pose {
             relearnt: 0,
             sectors: 1,
             walk_px: if parts > 1 { WALK_PX } else { WALK_SINGLE_PX },
+            tilt: Tilt::NONE,
+            tilts: false,
             path: Path::STILL,
             in_period: 0,
             phases: None,
@@ -172,9 +184,27 @@ impl Pose {
     pub const fn unlike(mut self, parts: u8) -> Self {
         if parts > 1 {
             self.sectors = parts as u32;
+        }
+        // Of two that differ, one may be none: then there is a single mark.
+        if parts > 2 {
             self.walk_px = WALK_PX;
         }
         self
+    }
+
+    /// The same for a rotor that may be tilted, as far as it is known. With less than three blades a tilt and an uneven turn look
+    /// alike, and in doubt a neighbour of the harmonic may look like a tilt.
+    #[must_use]
+    pub const fn tilted(mut self, tilt: Tilt) -> Self {
+        self.tilt = tilt;
+        self.tilts = true;
+        self
+    }
+
+    /// How the rotor is tilted, if that was asked.
+    #[must_use]
+    pub fn tilt(&self) -> Option<Tilt> {
+        self.tilts.then_some(self.tilt)
     }
 
     /// Angular harmonic that was followed at last.
@@ -310,23 +340,39 @@ impl Pose {
                 coherence: self.coherence,
                 harmonic: self.harmonic,
                 radius_px: self.disc.radius_px,
+                omega_rad_s: self.omega_rad_s,
             };
             moved_px = correct(&mut self.path, &sums.blocks, walk).unwrap_or(f32::MAX);
+            if self.asks_tilt() {
+                let share = self.coherence.max(LEAST_SHARE);
+                self.tilt.correct(&sums.tilt, share, self.harmonic as f32);
+            }
         }
         let at_high = sums.high.coherence(&sums.counts);
+        let least = if self.is_sparse() { SPARSE_COHERENCE } else { SHARP_COHERENCE };
         let worth = at_high > at_low
-            || fine && at_high > SHARP_COHERENCE * self.first_coherence && 2.0 * at_high > at_low;
+            || fine && at_high > least * self.first_coherence && 2.0 * at_high > at_low;
         let sharper = worth && self.may_double();
         self.harmonic *= if sharper { 2 } else { 1 };
         self.coherence = if sharper { at_high } else { at_low };
         if !fine {
             self.first_coherence = self.coherence;
         }
-        self.phases = Some(if sharper { &sums.high } else { &sums.low }.phases());
+        self.phases = Some(if sharper { &sums.high } else { &sums.low }.phases(&sums.counts));
         if self.schedule.advance(if sharper { f32::MAX } else { moved_px }) {
             self.divide();
         }
         false
+    }
+
+    /// A sample of the events tells it well enough.
+    fn asks_tilt(&self) -> bool {
+        self.tilts && self.schedule.phase() < Phase::All
+    }
+
+    /// Whether blocks are as long as few events make them.
+    fn is_sparse(&self) -> bool {
+        (self.events as f32 * self.even_share) < (BLOCK_EVENTS * MAX_KNOTS) as f32
     }
 
     const fn may_double(&self) -> bool {
@@ -377,12 +423,14 @@ impl Pose {
         let rings = (RINGS / self.sectors as usize).max(1);
         let rings_per_px = rings as f32 / self.disc.radius_px.max(1.0);
         let doubles = self.may_double();
+        let tilts = self.asks_tilt();
         let mut seen = Vec::new();
         for event in window.segment(self.segment).iter().step_by(stride) {
             let t_us = disc.since_middle_us(*event);
             let (index, f) = self.path.place(t_us as f32);
             let knot = self.path.between((index, f));
-            let Some((x_px, y_px, r2)) = disc.place_by(*event, knot) else { continue };
+            let Some((x_px, y_px, _)) = disc.place_by(*event, knot) else { continue };
+            let (x_px, y_px, r2) = self.tilt.undone(x_px, y_px);
             let turn = Turn::from_rad(knot.turn_rad).plus(rate.after(t_us));
             let angle = Turn::of_vector(y_px, x_px).minus(turn);
             let (s, c) = angle.times(self.harmonic).sin_cos();
@@ -395,13 +443,16 @@ impl Pose {
                 sums.high.add(bank, (2.0 * s * c, c * c - s * s));
             }
             let Some(phases) = &self.phases else { continue };
-            let (re, im) = phases[bank];
+            let (re, im, weight) = phases[bank];
             let off = (s * re - c * im, c * re + s * im);
             let per_r2 = 1.0 / r2;
             let (x, y) = (-y_px * per_r2, x_px * per_r2);
             let (sin_psi, cos_psi) = off;
+            if tilts {
+                sums.tilt.add((x_px, y_px), per_r2, sin_psi);
+            }
             let t_us = t_us as f32;
-            seen.push(Seen { block: index, x, y, sin_psi, cos_psi, t_us, f }).ok();
+            seen.push(Seen { block: index, x, y, sin_psi, cos_psi, t_us, f, weight }).ok();
             if seen.is_full() {
                 blocks::add(&mut sums.blocks, &mut seen);
             }
@@ -423,7 +474,6 @@ impl Pose {
     fn trend(&self, sums: &Sums) -> Option<Slope> {
         let count = self.path.blocks();
         let periods = count / self.in_period.max(1);
-        let fold = if periods >= FOLDED_PERIODS { self.in_period.max(1) } else { 1 };
         let half_us = 0.5 * self.window_us;
         let mut points = Vec::<Point, MAX_KNOTS>::new();
         for block in sums.blocks.iter().take(count) {
@@ -432,7 +482,13 @@ impl Pose {
             let y = self.path.at(t_us).turn_rad + off_rad;
             points.push(Point { u: t_us / half_us, y, weight }).ok();
         }
-        let trend = Trend::fit(&points, fold)?;
+        // Blocks a period apart see the same pixels, unless the axis wanders: what tells more exactly.
+        let folded = periods >= FOLDED_PERIODS && self.in_period > 1;
+        let trend = [1, self.in_period]
+            .into_iter()
+            .take(1 + usize::from(folded))
+            .filter_map(|fold| Trend::fit(&points, fold))
+            .min_by(|a, b| a.slope_error.total_cmp(&b.slope_error))?;
         let factor = student_over_normal(trend.degrees_of_freedom);
         let half_s = half_us * 1e-6;
         Some(Slope {

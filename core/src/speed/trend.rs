@@ -1,9 +1,11 @@
 //! The trend of the turn through the window: how far the rotor turned from its first instant to its last.
 //!
 //! The mean speed over a window is the turn between its ends, and the slope of a straight line only while the speed
-//! holds still: the hand that rolls the camera and the motor that hunts bend the line. So polynomials are added for
-//! as long as they explain more than noise does; each is made orthogonal to those before, hence its
-//! coefficient and its error stand by themselves, and no system of equations is solved.
+//! holds still: the hand that rolls the camera and the motor that hunts bend the line. So polynomials are added, each
+//! orthogonal to those before; hence its coefficient and its error stand by themselves, and no system of equations is
+//! solved. What bends the line is smooth: coefficients are thought to be the smaller the higher their degree, and how large
+//! they are at all the points tell. Each then counts by the share of it that is no noise, so that a line stays one before a
+//! tripod, and what may be left of the others is in the error.
 
 use crate::math::{ln, sqrt};
 
@@ -11,11 +13,13 @@ use crate::math::{ln, sqrt};
 pub const MOST_POINTS: usize = crate::limits::MAX_KNOTS;
 /// Highest degree.
 const MOST_DEGREE: usize = 16;
-/// A further degree must lower twice the negative logarithm of the likelihood by this: twice what Schwarz's criterion asks for
-/// the number of points here, because each degree multiplies the variance of the ends.
-const DEGREE_COST: f32 = 8.0;
-/// So many further degrees in vain are the last.
-const IN_VAIN: usize = 4;
+/// Degree from which on coefficients fall, and this power of their degree that the variance falls by: hands tremble up to
+/// 12 Hz, and a sine of so few turns in a window has little beyond.
+const FIRST_BEND: usize = 3;
+const FALLS_BY: usize = 8;
+/// Variances of the third coefficient that are tried, in that of the noise: none, and powers of four from this on.
+const LEAST_BEND: f32 = 0.25;
+const BENDS: usize = 17;
 /// What is left of a polynomial beside those before, below which it says nothing new.
 const LEAST_REST: f32 = 1e-3;
 
@@ -35,14 +39,12 @@ pub struct Point {
 pub struct Trend {
     /// Change of y over the window, over two: the mean slope.
     pub slope: f32,
-    /// Its standard error from the scatter about the trend.
+    /// Its standard error from the scatter about the trend, and from what the trend may not show.
     pub slope_error: f32,
     /// Second derivative of the parabola.
     pub bend: f32,
-    /// Its standard error.
+    /// Its standard error as a parabola beside all else that bends the trend.
     pub bend_error: f32,
-    /// Degree that was needed.
-    pub degree: usize,
     /// Points beyond those that the fit takes up.
     pub degrees_of_freedom: usize,
 }
@@ -94,8 +96,7 @@ impl Trend {
         let mut basis = [[0.0_f32; MOST_POINTS]; MOST_DEGREE];
         // Mean slope over the window of each polynomial, and its coefficient.
         let (mut slopes, mut coefficients) = ([0.0_f32; MOST_DEGREE], [0.0_f32; MOST_DEGREE]);
-        let mut bend = 0.0;
-        let mut best: Option<(f32, Self)> = None;
+        let (mut bend, mut degrees) = (0.0, 0);
         for degree in 1..=MOST_DEGREE.min(free / 3) {
             let index = degree - 1;
             let (before, after) = basis.split_at_mut(index);
@@ -126,29 +127,78 @@ impl Trend {
             let coefficient = points.product(values, &rest);
             rest.iter_mut().zip(values.iter()).for_each(|(r, v)| *r -= coefficient * v);
             coefficients[index] = coefficient;
-            let degrees_of_freedom = free - degree;
-            let squares = points.product(&rest, &rest);
-            let variance = squares / degrees_of_freedom as f32;
-            let cost =
-                free as f32 * ln(squares.max(f32::MIN_POSITIVE)) + DEGREE_COST * degree as f32;
-            let sum = |terms: &mut dyn Iterator<Item = f32>| terms.fold(0.0, |a, b| a + b);
-            let found = Self {
-                slope: sum(&mut slopes.iter().zip(coefficients).map(|(s, c)| s * c)),
-                slope_error: sqrt(variance * sum(&mut slopes.iter().map(|s| s * s))),
-                bend: if degree >= 2 { bend * coefficients[1] } else { 0.0 },
-                bend_error: sqrt(variance) * bend,
-                degree,
-                degrees_of_freedom,
-            };
-            // A parabola always: its bend is asked for.
-            if degree <= 2 || best.is_none_or(|(least, _)| cost < least) {
-                best = Some((cost, found));
-            } else if best.is_some_and(|(_, best)| degree >= best.degree + IN_VAIN) {
-                break;
-            }
+            degrees = degree;
         }
-        best.map(|(_, found)| found).filter(|found| found.degree >= 2)
+        if degrees < 2 {
+            return None;
+        }
+        let squares = points.product(&rest, &rest);
+        let terms = (&slopes[..degrees], &coefficients[..degrees]);
+        let mut tried = [(0.0, Self::default()); BENDS];
+        let (mut size, mut least) = (0.0, f32::INFINITY);
+        for trend in &mut tried {
+            *trend = shrunk(terms, squares, free, size);
+            least = least.min(trend.0);
+            size = (4.0 * size).max(LEAST_BEND);
+        }
+        // The mean of all, each as likely as the points make it.
+        let mut whole = 0.0;
+        let mut mean = [0.0_f32; 5];
+        for (cost, trend) in &tried {
+            // exp(-x / 2), but for what is hardly likely.
+            let likely = (0..4).fold(1.0 / (1.0 + (cost - least) / 32.0), |x, _| x * x);
+            whole += likely;
+            let Self { slope, slope_error, bend_error, .. } = *trend;
+            let moments = [
+                slope,
+                slope * slope,
+                slope_error * slope_error,
+                bend_error * bend_error,
+                trend.degrees_of_freedom as f32,
+            ];
+            mean.iter_mut().zip(moments).for_each(|(mean, moment)| *mean += likely * moment);
+        }
+        let [slope, square, variance, bend_variance, degrees_of_freedom] = mean.map(|m| m / whole);
+        Some(Self {
+            slope,
+            slope_error: sqrt(variance + (square - slope * slope).max(0.0)),
+            bend: bend * coefficients[1],
+            bend_error: bend * sqrt(bend_variance),
+            degrees_of_freedom: degrees_of_freedom as usize,
+        })
     }
+}
+
+/// The trend where the third coefficient's variance is `size` times that of the noise, and by how much the points speak against that:
+/// twice the negative logarithm of their likelihood. `terms` are slopes and coefficients by degree, `squares` what they leave of
+/// `free` points. The bend's error is that of the second coefficient.
+fn shrunk(terms: (&[f32], &[f32]), squares: f32, free: usize, size: f32) -> (f32, Trend) {
+    let (mut sum, mut cost, mut slope, mut share, mut taken) = (squares, 0.0, 0.0, 0.0, 0.0);
+    for (index, (s, c)) in terms.0.iter().zip(terms.1).enumerate() {
+        // A parabola always: its bend is asked for.
+        let kept = if index + 1 < FIRST_BEND {
+            1.0
+        } else {
+            let fall = FIRST_BEND as f32 / (index + 1) as f32;
+            let ratio = size * (0..FALLS_BY).fold(1.0, |power, _| power * fall);
+            sum += c * c / (1.0 + ratio);
+            cost += ln(1.0 + ratio);
+            ratio / (1.0 + ratio)
+        };
+        slope += kept * s * c;
+        share += kept * s * s;
+        taken += kept;
+    }
+    let n = (free + 1 - FIRST_BEND) as f32;
+    let variance = sum / n;
+    let found = Trend {
+        slope,
+        slope_error: sqrt(variance * share),
+        bend: 0.0,
+        bend_error: sqrt(variance * (1.0 + size)),
+        degrees_of_freedom: (free as f32 - taken) as usize,
+    };
+    (cost + n * ln(sum.max(f32::MIN_POSITIVE)), found)
 }
 
 /// Legendre's polynomial.
@@ -180,7 +230,6 @@ mod tests {
     fn a_parabola_is_found_with_its_error() {
         let found = Trend::fit(&points(1e-3, |u| 1.0 + 2.0 * u + 3.0 * u * u), 1);
         let found = found.unwrap_or_default();
-        assert_eq!(found.degree, 2);
         assert!((found.slope - 2.0).abs() < 3.0 * found.slope_error, "{found:?}");
         assert!(found.slope_error < 1e-3, "{found:?}");
         assert!((found.bend - 6.0).abs() < 3.0 * found.bend_error, "{found:?}");
@@ -191,7 +240,6 @@ mod tests {
         let wave = |u: f32| 0.3 * u + 0.05 * libm::sinf(5.0 * u + 0.7);
         let found = Trend::fit(&points(1e-3, wave), 1).unwrap_or_default();
         let mean = 0.5 * (wave(1.0) - wave(-1.0));
-        assert!(found.degree > 4, "{found:?}");
         assert!((found.slope - mean).abs() < 3.0 * found.slope_error, "{mean} {found:?}");
     }
 

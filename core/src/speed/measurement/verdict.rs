@@ -17,7 +17,7 @@ const LEAST_COHERENCE: f32 = 0.3;
 const MOST_BLUR: (f32, f32) = (0.1, 1.5);
 const LEAST_BLUR: (f32, f32) = (0.06, 1.3);
 /// Standard deviation of the events' times in dim light.
-const MOST_JITTER_S: f32 = 150e-6;
+const MOST_JITTER_S: f32 = 200e-6;
 /// Scatter of a phase by that jitter beyond which a registration is not believed where it contradicts.
 const MOST_SCATTER_RAD: f32 = 0.8;
 /// The same beyond which it leaves no edge: half an octave past the harmonic that it shows best.
@@ -56,13 +56,15 @@ const MARK_BLOCKS: usize = 4;
 const BIAS_RAD: f32 = 5e-3;
 /// Standard deviation of the error by a busy readout, as a share of how far its queue may stretch the window.
 const QUEUE_SIGMA: f32 = 0.5;
-/// Roll of a hand-held camera for each pixel of shift: tremor turns the camera by about one milliradian as
-/// it shifts the image by one pixel.
-const ROLL_RAD_PER_PX: f32 = 1e-3;
-/// Each half of a window holds twice the roll of the whole, so the halves differ by the root of eight of it, half a window apart.
-const ROLL_APART: f32 = 5.7;
+/// Roll of a hand-held camera for each pixel of shift, which has two directions where roll has one: tremor turns the camera by about
+/// one milliradian as it shifts the image by one pixel along either.
+const ROLL_RAD_PER_PX: f32 = 1e-3 / core::f32::consts::SQRT_2;
 /// Slower wandering of the centre than this in px/s is the measurement's own noise.
 const STILL_PX_S: f32 = 6.0;
+/// Window over which the mean roll rate of a tremor of 1 to 12 Hz, from which longer ones keep the less, is what it is at an instant.
+const ROLL_LASTS_S: f32 = 0.067;
+/// Each half of a window holds twice the roll of the whole, so the halves differ by the root of eight of it, half a window apart.
+const ROLL_APART: f32 = 5.7;
 
 impl Measurement {
     /// Combines the witnesses of the lock, or says why the reading stays coarse.
@@ -213,7 +215,7 @@ impl Measurement {
     /// The reading of a single mark is as good as its axis holds still, where it is not followed around the turn: what the mark does
     /// and what the camera does look alike.
     fn widen_mark(&mut self) {
-        if self.parts == Some(1) {
+        if self.parts == Some(1) || self.parts == Some(2) && !self.alike {
             let turn_rad = self.evidence.periods.unwrap_or(0.0) * TAU;
             let shake = SHAKE_PX / (self.disc.radius_px * turn_rad) * self.omega_rad_s;
             let own = self.estimate.sigma_rad_s;
@@ -272,5 +274,5 @@ fn combine(a: Estimate, b: Estimate) -> Estimate {
 /// Share of the tremor's roll rate that is left in the mean over a window: tremor swings back and forth at a
 /// few hertz, so a longer window averages more of it.
 fn roll_share(window_s: f32) -> f32 {
-    (0.1 / window_s).min(1.0)
+    (ROLL_LASTS_S / window_s).min(1.0)
 }

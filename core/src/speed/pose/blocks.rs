@@ -22,8 +22,9 @@ pub const MOST_FINE_WALK: f32 = 1.5;
 pub const WALK_PX: f32 = 0.5;
 /// The same for a rotor with a single mark, whose shift and turn look alike.
 pub const WALK_SINGLE_PX: f32 = 0.05;
-/// Turn beyond an even one from knot to knot, in radians.
-const WALK_RAD: f32 = 0.02;
+/// Turn beyond an even one from knot to knot, in rad/s: what a hand rolls, and as a share of the speed, what a motor hunts.
+const WALK_RAD_S: f32 = 0.2;
+const WALK_SHARE: f32 = 0.01;
 /// Farthest that a knot is moved at once.
 const STRIDE_PX: f32 = 3.0;
 
@@ -40,6 +41,8 @@ pub struct Seen {
     /// Time since the middle of the window, and how far through the block that is.
     pub t_us: f32,
     pub f: f32,
+    /// What it weighs, which its phase holds already.
+    pub weight: f32,
 }
 
 /// Events that are added at once.
@@ -107,14 +110,15 @@ impl Block {
 
     #[inline]
     fn add(&mut self, seen: &Seen) {
-        let &Seen { x, y, sin_psi, cos_psi, t_us, f, .. } = seen;
+        let &Seen { x, y, sin_psi, cos_psi, t_us, f, weight, .. } = seen;
+        let (wx, wy) = (weight * x, weight * y);
         let (x_psi, y_psi, late) = (x * sin_psi, y * sin_psi, f * sin_psi);
-        self.count += 1.0;
-        self.levers[0] += x;
-        self.levers[1] += y;
-        self.products[0] += x * x;
-        self.products[1] += x * y;
-        self.products[2] += y * y;
+        self.count += weight;
+        self.levers[0] += wx;
+        self.levers[1] += wy;
+        self.products[0] += wx * x;
+        self.products[1] += wx * y;
+        self.products[2] += wy * y;
         self.right[0] += sin_psi;
         self.right[1] += x_psi;
         self.right[2] += y_psi;
@@ -122,9 +126,10 @@ impl Block {
         self.later[1] += x * late;
         self.later[2] += y * late;
         self.in_step += cos_psi;
-        self.time_us += t_us;
-        self.way[0] += f;
-        self.way[1] += f * f;
+        self.time_us += weight * t_us;
+        let way = weight * f;
+        self.way[0] += way;
+        self.way[1] += way * f;
     }
 
     /// What the block knows about turn and shift.
@@ -140,7 +145,8 @@ impl Block {
         (1.0 - 2.0 * way + square, way - square, square)
     }
 
-    /// Turn in radians by which the block as a whole is off at harmonic `m`, and its weight.
+    /// Turn in radians by which the block as a whole is off at harmonic `m`, and what it knows of that whatever the shift:
+    /// as many events in step as would know as much if the shift were known.
     pub fn turn_rad(&self, m: f32) -> Option<(f32, f32)> {
         if self.count < LEAST_IN_BLOCK {
             return None;
@@ -148,8 +154,10 @@ impl Block {
         // Events scatter by about 1 / (2 share) in phase squared, which gives the prior its weight.
         let prior = 1.0 / (2.0 * self.share() * SHIFT_PRIOR_PX * SHIFT_PRIOR_PX);
         let damped = self.weight(m) + Matrix3::from_diagonal(&Vector3::new(0.0, prior, prior));
-        let off_rad = damped.cholesky()?.solve(&(Vector3::from(self.right) * m))[0];
-        off_rad.is_finite().then_some((off_rad, self.count))
+        let turn = damped.cholesky()?.solve(&Vector3::x());
+        let off_rad = turn.dot(&Vector3::from(self.right)) * m;
+        let weight = 1.0 / (turn[0] * m * m);
+        (off_rad.is_finite() && weight.is_finite()).then_some((off_rad, weight))
     }
 }
 
@@ -164,6 +172,8 @@ pub struct Walk {
     pub harmonic: u32,
     /// The rotor's radius.
     pub radius_px: f32,
+    /// Its speed in rad/s.
+    pub omega_rad_s: f32,
 }
 
 /// Moves the knots to where the blocks want them: least squares with a path that walks rather than jumps, a
@@ -171,14 +181,20 @@ pub struct Walk {
 /// where the blocks give no path.
 pub fn correct(path: &mut Path, blocks: &[Block; MAX_KNOTS], walk: Walk) -> Option<f32> {
     let blocks = &blocks[..path.blocks()];
+    let walk_rad = (WALK_RAD_S + WALK_SHARE * walk.omega_rad_s.abs()) * path.step_us() * 1e-6;
     let knots = path.knots_mut();
     let m = walk.harmonic as f32;
     let scatter = 1.0 / (2.0 * walk.coherence.max(LEAST_SHARE));
-    let (px, rad) = (scatter / (walk.step_px * walk.step_px), scatter / (WALK_RAD * WALK_RAD));
+    let (px, rad) = (scatter / (walk.step_px * walk.step_px), scatter / (walk_rad * walk_rad));
     let stiff = Matrix3::from_diagonal(&Vector3::new(rad, px, px));
+    // A speed that is off from the start is no walk.
+    let even_rad = match (knots.first(), knots.last()) {
+        (Some(first), Some(last)) => (last.turn_rad - first.turn_rad) / blocks.len().max(1) as f32,
+        _ => 0.0,
+    };
     let step = |k: usize| -> Option<Vector3<f32>> {
         let (a, b) = (knots.get(k)?, knots.get(k + 1)?);
-        Some(Vector3::new(b.turn_rad - a.turn_rad, b.x_px - a.x_px, b.y_px - a.y_px))
+        Some(Vector3::new(b.turn_rad - a.turn_rad - even_rad, b.x_px - a.x_px, b.y_px - a.y_px))
     };
     let link = |block: &Block| block.weight(m) * block.shares().1 - stiff;
     let mut inverses = Vec::<Matrix3<f32>, MAX_KNOTS>::new();

@@ -7,6 +7,9 @@ pub const RINGS: usize = 32;
 /// Banks: a ring for each polarity.
 pub const BANKS: usize = 2 * RINGS;
 
+/// Less than this share in step is none.
+const LEAST_COHERENCE: f32 = 1e-3;
+
 /// Template of a rotor: a harmonic by ring and polarity.
 #[derive(Clone, Copy, Debug)]
 pub struct Template {
@@ -37,11 +40,18 @@ impl Template {
         in_step / total.max(1.0)
     }
 
-    /// Every bank's phase as (cosine, sine).
-    pub fn phases(&self) -> [(f32, f32); BANKS] {
-        self.sums.map(|(re, im)| {
-            let length = sqrt(re * re + im * im).max(f32::MIN_POSITIVE);
-            (re / length, im / length)
-        })
+    /// Every bank's phase as (cosine, sine) times what its events weigh: as much as they are in step, 1 on average.
+    pub fn phases(&self, counts: &Counts) -> [(f32, f32, f32); BANKS] {
+        let mean = self.coherence(counts).max(LEAST_COHERENCE);
+        let mut phases = [(0.0, 0.0, 0.0); BANKS];
+        for ((phase, (re, im)), count) in phases.iter_mut().zip(self.sums).zip(counts) {
+            let count = *count as f32;
+            let square = re * re + im * im;
+            let length = sqrt(square).max(f32::MIN_POSITIVE);
+            let weight = sqrt((square - count).max(0.0)) / (count * mean).max(1.0);
+            let per = weight / length;
+            *phase = (re * per, im * per, weight);
+        }
+        phases
     }
 }
