@@ -35,6 +35,9 @@ const COLLECTED: f32 = 1.3;
 /// Events that are collected, of which about half are seen from a place; and those of a moment.
 const MOST_EVENTS: usize = 1_024;
 const MOMENT_EVENTS: usize = 512;
+/// A moment is no longer than this part of the window, where it then has so many events.
+const MOMENT_SHARE: usize = 3;
+const LEAST_IN_MOMENT: usize = 192;
 
 /// The look about the centre, place by place.
 #[derive(Clone, Copy, Debug)]
@@ -159,8 +162,9 @@ fn is_small(disc: Disc, harmonic: u32) -> bool {
 
 /// Keeps events of all of the window, or of a moment in its middle.
 fn keep(polar: &mut PolarTrack, moment: bool) {
+    let in_moment = (polar.len() / MOMENT_SHARE).clamp(LEAST_IN_MOMENT, MOMENT_EVENTS);
     let (before, stride) = if moment {
-        (polar.len().saturating_sub(MOMENT_EVENTS) / 2, 1)
+        (polar.len().saturating_sub(in_moment) / 2, 1)
     } else {
         (0, polar.len().div_ceil(MOST_EVENTS).max(1))
     };
@@ -169,7 +173,7 @@ fn keep(polar: &mut PolarTrack, moment: bool) {
         index += 1;
         index > before && index % stride == 0
     });
-    polar.truncate(if moment { MOMENT_EVENTS } else { MOST_EVENTS });
+    polar.truncate(if moment { in_moment } else { MOST_EVENTS });
 }
 
 impl Measurement {
