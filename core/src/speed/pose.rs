@@ -429,8 +429,8 @@ impl Pose {
             let t_us = disc.since_middle_us(*event);
             let (index, f) = self.path.place(t_us as f32);
             let knot = self.path.between((index, f));
-            let Some((x_px, y_px, _)) = disc.place_by(*event, knot) else { continue };
-            let (x_px, y_px, r2) = self.tilt.undone(x_px, y_px);
+            let Some(place) = disc.place_by(*event, knot) else { continue };
+            let (x_px, y_px, r2) = if self.tilts { self.tilt.undone(place) } else { place };
             let turn = Turn::from_rad(knot.turn_rad).plus(rate.after(t_us));
             let angle = Turn::of_vector(y_px, x_px).minus(turn);
             let (s, c) = angle.times(self.harmonic).sin_cos();

@@ -60,6 +60,8 @@ struct Points<'p> {
 
 impl Points<'_> {
     /// Takes from every value the mean over the points that share its offset; how many offsets there are.
+    // Not inlined, like the product: both are called in several places.
+    #[inline(never)]
     fn take_offsets(&self, values: &mut Values) -> usize {
         let mut offsets = 0;
         for first in 0..self.fold {
@@ -75,6 +77,7 @@ impl Points<'_> {
         offsets
     }
 
+    #[inline(never)]
     fn product(&self, a: &Values, b: &Values) -> f32 {
         self.points.iter().zip(a.iter().zip(b)).map(|(p, (a, b))| p.weight * a * b).sum()
     }

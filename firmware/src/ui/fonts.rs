@@ -32,10 +32,19 @@ pub const FONTS: [Source; 3] = [
     },
     Source {
         name: "MEDIUM",
-        about: "Values: capitals of 16 px.",
-        font: mplus!(1, 600, 22, true, 1, 2, ' '..='~', ["±", "×", "÷", "·", "–"]),
-        row: ' '..='~',
-        others: "±×÷·–",
+        about: "Values, letters of rotors and units: capitals of 16 px.",
+        font: mplus!(
+            1,
+            600,
+            22,
+            true,
+            1,
+            2,
+            '-'..='Z',
+            [" ", "±", "a", "d", "e", "g", "i", "m", "n", "p", "r", "s", "t", "z"]
+        ),
+        row: '-'..='Z',
+        others: " ±adegimnprstz",
     },
     Source {
         name: "HUGE",

@@ -54,6 +54,16 @@ fn every_word_fits_where_it_stands() {
     }
 }
 
+/// The font of values has no other letters.
+#[test]
+fn values_have_all_their_letters() {
+    let units = Unit::ALL.map(Unit::as_str).concat();
+    let rotors: std::string::String = (0..=26).map(theme::letter).collect();
+    for letter in ["Settings± 0123456789.-", &units, &rotors].concat().chars() {
+        assert!(width(&MEDIUM, &letter.to_string()) > 0, "{letter}");
+    }
+}
+
 #[test]
 fn a_text_is_as_wide_as_its_letters() {
     assert_eq!(width(&SMALL, ""), 0);

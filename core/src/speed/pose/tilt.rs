@@ -21,9 +21,9 @@ impl Tilt {
     /// Faced squarely.
     pub const NONE: Self = Self { along: 0.0, across: 0.0 };
 
-    /// Where an event lies, relative to the axis, in the rotor's own circle, and its squared distance.
+    /// Where an event that lies there, relative to the axis, lies in the rotor's own circle, and its squared distance.
     #[inline]
-    pub fn undone(self, x_px: f32, y_px: f32) -> (f32, f32, f32) {
+    pub fn undone(self, (x_px, y_px, _): (f32, f32, f32)) -> (f32, f32, f32) {
         let x = x_px - self.along * x_px - self.across * y_px;
         let y = y_px - self.across * x_px + self.along * y_px;
         (x, y, x * x + y * y)
