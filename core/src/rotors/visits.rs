@@ -174,6 +174,8 @@ impl Visits {
             *end -= start;
             start += *end;
         }
+        // Where the brighter events of each cell were counted there are times now, which add up to nothing.
+        self.times.fill(0);
         self.merge();
         self.cell = 0;
         self.chance = Chance::default();
