@@ -42,7 +42,7 @@ impl Schedule {
     pub const NEW: Self =
         Self { phase: Phase::First, round: 0, most: [3, 1, 6, 3], first_events: 3_072, share: 1 };
     /// For a rotor that was followed in the window before: a third of the events tell it as well.
-    pub const KNOWN: Self = Self { most: [1, 0, 2, 1], first_events: 1_536, share: 3, ..Self::NEW };
+    pub const KNOWN: Self = Self { most: [1, 0, 2, 1], first_events: 1_280, share: 3, ..Self::NEW };
 
     /// The phase that the next round belongs to.
     pub const fn phase(&self) -> Phase {
