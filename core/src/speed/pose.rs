@@ -12,18 +12,16 @@
 
 mod blocks;
 mod schedule;
+mod slope;
 mod template;
 mod tilt;
 
 use heapless::Vec;
 
-use super::baseline::Estimate;
-use super::path::{Knot, Moving, Path};
+use super::path::{Moving, Path};
 use super::polar::Annulus;
-use super::statistics::student_over_normal;
-use super::trend::{Point, Trend};
 use crate::limits::MAX_KNOTS;
-use crate::math::{TAU, Turn, TurnRate, larger, quick_sqrt, sqrt};
+use crate::math::{TAU, Turn, TurnRate, larger, quick_sqrt};
 use crate::rotors::Disc;
 use crate::store::{Even, Window};
 use blocks::{
@@ -31,6 +29,7 @@ use blocks::{
     WALK_US, Walk, correct,
 };
 use schedule::{Phase, Schedule};
+pub use slope::Slope;
 use template::{BANKS, Counts, RINGS, Template};
 pub use tilt::Tilt;
 use tilt::TiltSums;
@@ -43,29 +42,12 @@ const LEAST_BLOCKS: usize = 12;
 const SHORTEST_BLOCK_US: f32 = 3_000.0;
 /// Most blocks in a symmetry period.
 const MOST_IN_PERIOD: f32 = 12.0;
-/// Symmetry periods in the window from which on places in the period get offsets of their own.
-const FOLDED_PERIODS: usize = 3;
 /// Highest angular harmonic.
 const MOST_HARMONIC: u32 = 96;
 /// A doubled harmonic must keep this share of the events in step that were so at first.
 const SHARP_COHERENCE: f32 = 0.5;
 /// The same where blocks hold few events: a path that went astray at a sparse end does not find back to a harmonic so fine.
 const SPARSE_COHERENCE: f32 = 0.7;
-/// Blocks over which the wandering of the axis is judged.
-const DRIFT_BLOCKS: usize = 12;
-
-/// The turn followed through the window.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Slope {
-    /// Mean speed over the window.
-    pub speed: Estimate,
-    /// Acceleration in rad/s^2.
-    pub alpha_rad_s2: f32,
-    /// Its standard error in rad/s^2.
-    pub alpha_sigma_rad_s2: f32,
-    /// Root mean square speed of the axis in px/s: 0 on a tripod, tens in the hand.
-    pub drift_px_s: f32,
-}
 
 /// Sums of one round.
 #[derive(Clone, Debug)]
@@ -112,9 +94,8 @@ pub struct Pose {
     /// Parts that have a template of their own.
     sectors: u32,
     walk_px: f32,
-    tilt: Tilt,
-    /// Whether the tilt is asked for.
-    tilts: bool,
+    /// How the rotor is tilted, where that is asked.
+    tilt: Option<Tilt>,
     path: Path,
     /// Blocks in a symmetry period, 0 when blocks are whole periods.
     in_period: usize,
@@ -156,8 +137,7 @@ impl Pose {
             relearnt: 0,
             sectors: 1,
             walk_px: if parts > 1 { WALK_PX } else { WALK_SINGLE_PX },
-            tilt: Tilt::NONE,
-            tilts: false,
+            tilt: None,
             path: Path::STILL,
             in_period: 0,
             phases: None,
@@ -196,15 +176,14 @@ impl Pose {
     /// alike, and in doubt a neighbour of the harmonic may look like a tilt.
     #[must_use]
     pub const fn tilted(mut self, tilt: Tilt) -> Self {
-        self.tilt = tilt;
-        self.tilts = true;
+        self.tilt = Some(tilt);
         self
     }
 
     /// How the rotor is tilted, if that was asked.
     #[must_use]
-    pub fn tilt(&self) -> Option<Tilt> {
-        self.tilts.then_some(self.tilt)
+    pub const fn tilt(&self) -> Option<Tilt> {
+        self.tilt
     }
 
     /// Angular harmonic that was followed at last.
@@ -343,9 +322,11 @@ impl Pose {
                 omega_rad_s: self.omega_rad_s,
             };
             moved_px = correct(&mut self.path, &sums.blocks, walk).unwrap_or(f32::MAX);
-            if self.asks_tilt() {
+            if self.schedule.samples()
+                && let Some(tilt) = &mut self.tilt
+            {
                 let share = self.coherence.max(LEAST_SHARE);
-                self.tilt.correct(&sums.tilt, share, self.harmonic as f32);
+                tilt.correct(&sums.tilt, share, self.harmonic as f32);
             }
         }
         let at_high = sums.high.coherence(&sums.counts);
@@ -363,11 +344,6 @@ impl Pose {
             self.divide();
         }
         false
-    }
-
-    /// A sample of the events tells it well enough.
-    fn asks_tilt(&self) -> bool {
-        self.tilts && self.schedule.phase() < Phase::All
     }
 
     /// Whether blocks are as long as few events make them.
@@ -423,14 +399,15 @@ impl Pose {
         let rings = (RINGS / self.sectors as usize).max(1);
         let rings_per_px = rings as f32 / self.disc.radius_px.max(1.0);
         let doubles = self.may_double();
-        let tilts = self.asks_tilt();
+        // A sample of the events tells the tilt well enough.
+        let tilts = self.tilt.is_some() && self.schedule.samples();
         let mut seen = Vec::new();
         for event in window.segment(self.segment).iter().step_by(stride) {
             let t_us = disc.since_middle_us(*event);
             let (index, f) = self.path.place(t_us as f32);
             let knot = self.path.between((index, f));
             let Some(place) = disc.place_by(*event, knot) else { continue };
-            let (x_px, y_px, r2) = if self.tilts { self.tilt.undone(place) } else { place };
+            let (x_px, y_px, r2) = self.tilt.map_or(place, |tilt| tilt.undone(place));
             let turn = Turn::from_rad(knot.turn_rad).plus(rate.after(t_us));
             let angle = Turn::of_vector(y_px, x_px).minus(turn);
             let (s, c) = angle.times(self.harmonic).sin_cos();
@@ -468,58 +445,5 @@ impl Pose {
                 *block = Block::EMPTY;
             }
         }
-    }
-
-    /// The trend of the turn through the blocks, and how the axis wanders; `None` when too few blocks tell.
-    fn trend(&self, sums: &Sums) -> Option<Slope> {
-        let count = self.path.blocks();
-        let periods = count / self.in_period.max(1);
-        let half_us = 0.5 * self.window_us;
-        let mut points = Vec::<Point, MAX_KNOTS>::new();
-        for block in sums.blocks.iter().take(count) {
-            let t_us = block.middle_us();
-            let (off_rad, weight) = block.turn_rad(self.harmonic as f32).unwrap_or_default();
-            let y = self.path.at(t_us).turn_rad + off_rad;
-            points.push(Point { u: t_us / half_us, y, weight }).ok();
-        }
-        // Blocks a period apart see the same pixels, unless the axis wanders: what tells more exactly.
-        let folded = periods >= FOLDED_PERIODS && self.in_period > 1;
-        let trend = [1, self.in_period]
-            .into_iter()
-            .take(1 + usize::from(folded))
-            .filter_map(|fold| Trend::fit(&points, fold))
-            .min_by(|a, b| a.slope_error.total_cmp(&b.slope_error))?;
-        let factor = student_over_normal(trend.degrees_of_freedom);
-        let half_s = half_us * 1e-6;
-        Some(Slope {
-            speed: Estimate {
-                omega_rad_s: self.omega_rad_s + trend.slope / half_s,
-                sigma_rad_s: factor * trend.slope_error / half_s,
-            },
-            alpha_rad_s2: trend.bend / (half_s * half_s),
-            alpha_sigma_rad_s2: factor * trend.bend_error / (half_s * half_s),
-            drift_px_s: self.drift_px_s(),
-        })
-    }
-
-    fn drift_px_s(&self) -> f32 {
-        let size = self.path.blocks().div_ceil(DRIFT_BLOCKS).max(1);
-        let dt_s = size as f32 * self.path.step_us() * 1e-6;
-        let mean = |knots: &[Knot]| {
-            let n = knots.len() as f32;
-            let sum = |part: fn(&Knot) -> f32| knots.iter().map(part).sum::<f32>() / n;
-            (sum(|knot| knot.x_px), sum(|knot| knot.y_px))
-        };
-        let (mut squares, mut count, mut before) = (0.0, 0_u8, None);
-        for knots in self.path.knots().chunks_exact(size) {
-            let here = mean(knots);
-            if let Some((x, y)) = before {
-                let (vx, vy) = ((here.0 - x) / dt_s, (here.1 - y) / dt_s);
-                squares += vx * vx + vy * vy;
-                count += 1;
-            }
-            before = Some(here);
-        }
-        sqrt(squares / f32::from(count.max(1)))
     }
 }

@@ -13,7 +13,7 @@ use crate::speed::polar::{Annulus, PolarTrack, track};
 use crate::store::{Even, Window};
 
 /// Share in step of the second best harmonic over that of the best from which on they are in doubt.
-pub(super) const DOUBTFUL: f32 = 0.3;
+const DOUBTFUL: f32 = 0.3;
 /// The same where a centre that is off by little leads to another harmonic, which then shows as well.
 const SMALL_DOUBTFUL: f32 = 0.15;
 /// The same after the look about the centre, from which on nothing but edges tells them apart.

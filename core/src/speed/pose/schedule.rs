@@ -62,6 +62,11 @@ impl Schedule {
         }
     }
 
+    /// Whether this round looks at a sample of the events only.
+    pub fn samples(&self) -> bool {
+        self.phase < Phase::All
+    }
+
     /// Ends a round that moved the rim by so much; `true` when a new phase begins.
     pub fn advance(&mut self, moved_px: f32) -> bool {
         self.round += 1;
@@ -84,7 +89,7 @@ impl Schedule {
 
     /// Events that this round looks at, at most, of so many.
     pub fn events(&self, all: usize) -> usize {
-        if self.phase < Phase::All {
+        if self.samples() {
             self.first_events
         } else {
             (all / self.share).clamp(self.first_events, MOST_EVENTS)

@@ -18,9 +18,6 @@ pub struct Tilt {
 }
 
 impl Tilt {
-    /// Faced squarely.
-    pub const NONE: Self = Self { along: 0.0, across: 0.0 };
-
     /// Where an event that lies there, relative to the axis, lies in the rotor's own circle, and its squared distance.
     #[inline]
     pub fn undone(self, (x_px, y_px, _): (f32, f32, f32)) -> (f32, f32, f32) {
