@@ -1,10 +1,10 @@
 //! What the store hands out: the events of a stretch of time, and where they went.
 
-use super::{MOST_SEGMENTS, Roll, Store, StoredEvent};
+use super::{Held, MOST_SEGMENTS, Roll, Store, StoredEvent};
 
 impl Store<'_> {
-    /// The window over the oldest `segments` segments (the open one counts as the last when all closed
-    /// ones are taken), no longer than to `end_us`.
+    /// The window over the oldest `segments` segments, or over as many of those that are held (the open one counts as the last when
+    /// all closed ones are taken), no longer than to `end_us`.
     #[must_use]
     #[inline(never)]
     pub fn window(&self, segments: usize, end_us: u64) -> Window<'_> {
@@ -15,13 +15,15 @@ impl Store<'_> {
             let base = slot * self.capacity;
             *part = &self.events[base..base + self.segments[slot].len];
         }
-        Window {
-            parts,
-            start_us: self.start_us,
-            duration_us: (self.segment_us * segments as u32)
-                .min(end_us.saturating_sub(self.start_us).min(u64::from(u32::MAX)) as u32),
-            segments,
-        }
+        let Held { segments: held, .. } = self.held;
+        let (start_us, segment_us) = if held > 0 {
+            (self.held.start_us, self.held.segment_us)
+        } else {
+            (self.start_us, self.segment_us)
+        };
+        let duration_us = (segment_us * segments as u32)
+            .min(end_us.saturating_sub(start_us).min(u64::from(u32::MAX)) as u32);
+        Window { parts, start_us, duration_us, segments }
     }
 
     /// Events counted, kept and lost in the oldest `segments` segments.

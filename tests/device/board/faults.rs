@@ -128,7 +128,7 @@ fn far_more_events_than_the_port_carries() {
     assert!((rpm / RPM - 1.0).abs() < 0.01, "{read}");
     assert!(board.query("*IDN?").starts_with("EV-Tach"));
     board.cover();
-    // Twice a second the camera is asked what it dropped, as long as it has something to say.
+    // Ten times a second the camera is asked what it dropped, as long as it has something to say.
     board.run(1.2);
     // The camera's own filters leave out most of what the device could not use, its FIFO drops the rest, and both count.
     let camera = board.camera();
