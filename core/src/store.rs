@@ -12,6 +12,7 @@
 
 mod even;
 mod event;
+mod gyro;
 mod hold;
 mod lengthen;
 mod open;
@@ -24,6 +25,7 @@ pub use event::StoredEvent;
 pub use roll::Roll;
 pub use window::{Account, Window};
 
+use crate::event::GyroSample;
 use open::Segment;
 
 /// Segments in a window.
@@ -65,6 +67,8 @@ pub struct Store<'m> {
     start_us: u64,
     segment_us: u32,
     thinned: u64,
+    /// A gyro sample of a time behind the open segment.
+    ahead: Option<GyroSample>,
     /// The camera's roll in all segments that went by, and in those given up behind the ones that are measured.
     rolled: Roll,
     rolled_behind: Roll,
@@ -87,6 +91,7 @@ impl<'m> Store<'m> {
             start_us: 0,
             segment_us: segment_us.max(1),
             thinned: 0,
+            ahead: None,
             rolled: Roll::NONE,
             rolled_behind: Roll::NONE,
         }
@@ -100,6 +105,7 @@ impl<'m> Store<'m> {
         self.held = Held::default();
         self.start_us = start_us;
         self.segment_us = segment_us.max(1);
+        self.ahead = None;
         self.rolled_behind = Roll::NONE;
         unmeasured
     }
@@ -167,23 +173,14 @@ impl<'m> Store<'m> {
         self.segments[slot].lost = self.segments[slot].lost.saturating_add(count);
     }
 
-    /// Takes in the camera's roll rate, positive = the scene turns clockwise on the screen.
-    pub fn roll(&mut self, roll_rad_s: f32) {
-        let slot = self.slot(self.closed);
-        self.segments[slot].roll_sum_rad_s += roll_rad_s;
-        self.segments[slot].roll_count += 1;
-    }
-
     /// What a segment's gyro samples say, if it has any.
     #[inline(never)]
     fn roll_of(&self, index: usize) -> Roll {
-        let Segment { roll_sum_rad_s, roll_count, .. } = self.segments[self.slot(index)];
-        if roll_count == 0 {
+        let Some(mean_rad_s) = self.segments[self.slot(index)].rates.mean_rad_s() else {
             return Roll::NONE;
-        }
+        };
         let held = index < self.held.segments;
-        let segment_us = if held { self.held.segment_us } else { self.segment_us };
-        Roll::at(roll_sum_rad_s / roll_count as f32, segment_us)
+        Roll::at(mean_rad_s, if held { self.held.segment_us } else { self.segment_us })
     }
 
     /// Forgets what the gyro said: it is another one.
@@ -198,6 +195,7 @@ impl<'m> Store<'m> {
         self.closed += 1;
         let slot = self.slot(self.closed);
         self.segments[slot] = Segment::after(&before, self.capacity);
+        self.settle();
     }
 
     /// Moves on from the oldest closed segment. None is held.

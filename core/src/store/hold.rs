@@ -23,8 +23,8 @@ impl Store<'_> {
     }
 
     fn is_open_empty(&self) -> bool {
-        let Segment { counted, lost, roll_count, .. } = self.segments[self.slot(self.closed)];
-        counted == 0 && lost == 0 && roll_count == 0
+        let Segment { counted, lost, rates, .. } = self.segments[self.slot(self.closed)];
+        counted == 0 && lost == 0 && rates.is_empty()
     }
 
     /// Holds all that is stored for being measured, up to the last event, which came at `last_us`, and goes on with segments of
@@ -50,6 +50,7 @@ impl Store<'_> {
         let slot = self.slot(self.closed);
         self.segments[slot] = Segment::after(&Segment { counted, ..before }, self.capacity);
         self.segment_us = segment_us.max(1);
+        self.settle();
         segments
     }
 

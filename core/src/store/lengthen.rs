@@ -65,8 +65,7 @@ impl Store<'_> {
                 if ((i - held) as u64 * old_us) / u64::from(segment_us) == nth {
                     merged.lost = merged.lost.saturating_add(segment.lost);
                     merged.unmeasured = merged.unmeasured.saturating_add(segment.unmeasured);
-                    merged.roll_sum_rad_s += segment.roll_sum_rad_s;
-                    merged.roll_count += segment.roll_count;
+                    merged.rates = merged.rates.and(segment.rates);
                 }
             }
             let slot = self.slot(new);

@@ -1,5 +1,6 @@
 //! What the store hands out: the events of a stretch of time, and where they went.
 
+use super::gyro::Rates;
 use super::{Held, MOST_SEGMENTS, Roll, Store, StoredEvent};
 
 impl Store<'_> {
@@ -35,8 +36,7 @@ impl Store<'_> {
             account.counted += segment.counted;
             account.kept += segment.len as u64;
             account.lost = account.lost.saturating_add(segment.lost);
-            account.roll_sum_rad_s += segment.roll_sum_rad_s;
-            account.roll_count += segment.roll_count;
+            account.rates = account.rates.and(segment.rates);
             account.rolled = account.rolled.and(self.roll_of(index));
         }
         account
@@ -52,10 +52,7 @@ pub struct Account {
     pub kept: u64,
     /// Reported lost by the sensor or the link.
     pub lost: u64,
-    /// Sum of the camera's roll rates.
-    roll_sum_rad_s: f32,
-    /// Number of roll rates.
-    roll_count: u32,
+    rates: Rates,
     /// The camera's roll up to the end of the window, as far as it was heard.
     pub rolled: Roll,
 }
@@ -64,7 +61,7 @@ impl Account {
     /// Mean roll rate of the camera in rad/s, where a gyro was heard.
     #[must_use]
     pub fn roll_rad_s(&self) -> Option<f32> {
-        (self.roll_count > 0).then(|| self.roll_sum_rad_s / self.roll_count as f32)
+        self.rates.mean_rad_s()
     }
 }
 
