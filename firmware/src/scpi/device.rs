@@ -113,6 +113,9 @@ pub trait Device {
     /// shows none.
     fn reading(&self) -> Option<&Reading>;
 
+    /// The last reading, whether the screen shows it or, by now, something else.
+    fn last_reading(&self) -> Option<&Reading>;
+
     /// Why the screen shows no reading.
     fn reason(&self) -> Reason;
 
