@@ -5,7 +5,9 @@
 //! two of their error bar on average.
 #![allow(clippy::panic)] // A test fails by it.
 
-use evtach_core::{Direction, Event, Geometry, Polarity, Poll, Reading, RotorReading, Settings, Speed};
+use evtach_core::{
+    Direction, Event, Geometry, Polarity, Poll, Reading, RotorReading, Settings, Speed,
+};
 use evtach_host::measure::{Capacity, drain, measure_events, summarise, with_tachometer};
 use evtach_host::synth::{Model, Rotor, Scene, generate};
 
@@ -245,9 +247,18 @@ fn a_measurement_that_lasts_long_leaves_all_that_came_meanwhile_to_the_next() {
                 let half_us = u64::from(reading.window_us / 2);
                 (reading.t_us - half_us, reading.t_us + half_us)
             };
-            println!("{:?}", readings.iter().map(|r| (r.t_us, r.window_us, r.events, r.status)).collect::<Vec<_>>());
+            println!(
+                "{:?}",
+                readings
+                    .iter()
+                    .map(|r| (r.t_us, r.window_us, r.events, r.status))
+                    .collect::<Vec<_>>()
+            );
             let longest = readings.iter().map(|reading| reading.window_us).max();
-            assert!(longest > Some(200_000), "a window of {longest:?} us: nothing was to catch up with");
+            assert!(
+                longest > Some(200_000),
+                "a window of {longest:?} us: nothing was to catch up with"
+            );
             assert!(readings.len() > 3, "{} readings", readings.len());
             for pair in readings.windows(2) {
                 let [before, next] = pair else { unreachable!() };
