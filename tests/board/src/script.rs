@@ -108,7 +108,14 @@ fn events(path: &str) -> Result<Vec<Event>> {
 impl Script {
     /// Someone at a device.
     pub fn new(machine: Machine) -> Self {
-        Self { machine, camera: None, firmware: None, roll_rad_s: 0.0, swing_rad_s: 0.0, repeat_us: None }
+        Self {
+            machine,
+            camera: None,
+            firmware: None,
+            roll_rad_s: 0.0,
+            swing_rad_s: 0.0,
+            repeat_us: None,
+        }
     }
 
     /// Carries out a line and says what comes of it.
