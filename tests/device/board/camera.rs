@@ -161,7 +161,7 @@ fn a_gyro_tells_the_speed_in_the_room_once_its_offset_is_found() {
             width_px: pixels.width_px,
             height_px: pixels.height_px,
             rotors: vec![rotor],
-            duration_ms: 12_500.0,
+            duration_ms: 13_500.0,
             ..Scene::default()
         };
         scene.sensor.noise_hz = 0.0;
@@ -198,11 +198,13 @@ fn a_gyro_tells_the_speed_in_the_room_once_its_offset_is_found() {
         assert!(off.abs() < 0.5 * OFFSET_RAD_S * RPM_PER_RAD_S, "{camera:?}: {off}");
         // Now it says that the camera turns, clockwise in the picture as the rotor does: so that turns more slowly in the room.
         board.break_(&format!("roll {}", OFFSET_RAD_S + ROLL_RAD_S));
-        let turned = told(&mut board, 1);
-        // The windows of the last half second lie behind the change.
+        let turned = told(&mut board, 2);
+        // The windows of the last half second lie behind the change, whatever is searched for meanwhile; some of it is taken for
+        // the gyro's offset by then.
         let end = &turned[turned.len().saturating_sub(5)..];
         let off = end.iter().map(|(off, ..)| off).sum::<f64>() / end.len() as f64;
-        assert!((off + ROLL_RAD_S * RPM_PER_RAD_S).abs() < 0.5, "{camera:?}: {turned:?}");
+        let turns = ROLL_RAD_S * RPM_PER_RAD_S;
+        assert!((off + turns).abs() < 0.25 * turns, "{camera:?}: {off}: {turned:?}");
         board.assert_sound();
     }
 }
