@@ -83,7 +83,9 @@ impl Measurement {
         // What jitter leads astray says nothing.
         let lock = lock.filter(|lock| self.registers() || self.bears_out(*lock, phase));
         if let (Some(lock), Some(phase)) = (lock, phase) {
-            let both = combine(lock, phase);
+            let mut both = combine(lock, phase);
+            // A lock's scatter does not show how the speed changed meanwhile: it is no surer than the phase can bear it out.
+            both.sigma_rad_s = both.sigma_rad_s.max(phase.sigma_rad_s / LOCK_SIGMAS);
             let sharp = both.sigma_rad_s.max(held_up * both.omega_rad_s.abs())
                 < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
             let long = self.wanted_us <= 1.02 * window.duration_us as f32;
