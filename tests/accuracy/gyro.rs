@@ -65,8 +65,8 @@ fn from_a_hand_a_speed_is_right_while_the_offset_of_the_gyro_is_being_found() {
             1e3 * offset_rad_s
         ));
         in_the_room += last.iter().filter(|(_, _, frame)| *frame == Frame::Room).count();
-        // An offset that stayed in it would be 0.19 rpm.
-        assert!(off.abs() < 0.06, "{off}");
+        // An offset that stayed in it would be 0.19 rpm, and a mean over two seconds of a hand is good to 0.06.
+        assert!(off.abs() < 0.12, "{off}");
     }
     assert!(in_the_room > 0, "the gyro helped nowhere");
 }

@@ -267,13 +267,13 @@ impl Measurement {
 fn combine(a: Estimate, b: Estimate) -> Estimate {
     let (va, vb) = (a.sigma_rad_s * a.sigma_rad_s, b.sigma_rad_s * b.sigma_rad_s);
     let (wa, wb) = (vb / (va + vb), va / (va + vb));
-    // Where they are farther apart than chance puts one pair in six, their errors are too small by as much (Birge's ratio).
+    // Where they are farther apart than their errors say, these are too small by as much (Birge's ratio).
     let apart = (a.omega_rad_s - b.omega_rad_s) * (a.omega_rad_s - b.omega_rad_s) / (va + vb);
     let (ea, eb) = (wa * a.sigma_rad_s, wb * b.sigma_rad_s);
     let variance = ea * ea + eb * eb + 2.0 * IN_COMMON * ea * eb;
     Estimate {
         omega_rad_s: a.omega_rad_s * wa + b.omega_rad_s * wb,
-        sigma_rad_s: sqrt(variance * (0.5 * apart).max(1.0)),
+        sigma_rad_s: sqrt(variance * apart.max(1.0)),
     }
 }
 
