@@ -235,7 +235,8 @@ impl Tachometer<'_> {
         self.store.lost(count);
     }
 
-    /// Takes in a gyro sample, before or behind the events of its time, but before a window with these has been measured. One that no gyro gives (not a number, or faster than any measures) is left out.
+    /// Takes in a gyro sample, before or behind the events of its time, but before a window with these has been measured. One that no
+    /// gyro gives (not a number, or faster than any measures) is left out.
     pub fn gyro(&mut self, sample: GyroSample) {
         let believed = sample.roll_rad_s.abs() <= FASTEST_ROLL_RAD_S;
         if self.started && believed {
