@@ -16,6 +16,16 @@ const OFFSETS: [(f64, Capacity); 3] =
     [(0.0, Capacity::Device), (0.02, Capacity::Device), (-0.02, Capacity::Full)];
 
 fn readings(camera: Camera, offset_rad_s: f64, seed: u64, capacity: Capacity) -> Vec<Reading> {
+    readings_with(Settings::new, camera, offset_rad_s, seed, capacity)
+}
+
+fn readings_with(
+    settings: impl Fn(Geometry) -> Settings,
+    camera: Camera,
+    offset_rad_s: f64,
+    seed: u64,
+    capacity: Capacity,
+) -> Vec<Reading> {
     let gyro = Gyro { offset_rad_s, ..Gyro::default() };
     let scene = Scene {
         rotors: vec![Rotor { rpm: RPM, radius_px: 30.0, ..Rotor::default() }],
@@ -27,7 +37,7 @@ fn readings(camera: Camera, offset_rad_s: f64, seed: u64, capacity: Capacity) ->
     };
     let made = generate(&scene).expect("a scene in range");
     let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
-    measure_events(&made.events, &made.gyro, Settings::new(geometry), capacity).0
+    measure_events(&made.events, &made.gyro, settings(geometry), capacity).0
 }
 
 /// How far a reading is off, how far it may be (one sigma), both in rpm, and what it is relative to.
@@ -80,6 +90,30 @@ fn on_a_tripod_a_gyro_takes_nothing_from_a_speed() {
             assert!(off.abs() < 4.0 * sigma, "{offset_rad_s}: {off} +/- {sigma}");
             assert_eq!(frame, Frame::Camera);
             assert!(sigma < 1e-3 * RPM, "{sigma}");
+        }
+    }
+}
+
+/// As on a turntable. A hand's roll averages out, and so is what the gyro tells in the mean taken for its offset; this one does not.
+#[test]
+fn a_camera_that_rolls_round_is_not_taken_for_a_gyro_s_offset() {
+    const ROLL_RAD_S: f64 = 0.3;
+    let camera = || Camera { roll_rad_s: ROLL_RAD_S, ..presets::hand() };
+    let rpm_relative = ROLL_RAD_S * 60.0 / std::f64::consts::TAU;
+    for (gyro_sigma_rad_s, wanted, right) in
+        [(None, Frame::Camera, rpm_relative), (Some(3e-3), Frame::Room, 0.0)]
+    {
+        let settings = |geometry| {
+            let settings = Settings::new(geometry);
+            let gyro_sigma_rad_s = gyro_sigma_rad_s.unwrap_or(settings.gyro_sigma_rad_s);
+            Settings { gyro_sigma_rad_s, ..settings }
+        };
+        let readings = readings_with(settings, camera(), 0.0, 90, Capacity::Device);
+        let told: Vec<_> = readings.iter().filter_map(told).collect();
+        assert!(told.len() > 80, "{} of {} readings", told.len(), readings.len());
+        for (off, sigma, frame) in told {
+            assert_eq!(frame, wanted);
+            assert!((off - right).abs() < 4.0 * sigma, "{off} instead of {right} +/- {sigma}");
         }
     }
 }

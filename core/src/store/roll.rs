@@ -2,13 +2,19 @@
 //!
 //! A gyro at rest tells a rate as well: its zero-rate offset. Whoever holds a camera turns it to and fro, but not round: over a
 //! stretch of time the camera comes back to about where it was, and the mean of what the gyro tells is the offset. So no
-//! calibration is asked for; the longer a rotor is looked at, the better the offset is known.
+//! calibration is asked for; the longer a rotor is looked at, the better the offset is known. Where the mean is more than an
+//! offset may well be, the camera is not held, and only what was stated is known.
 
 use crate::math::sqrt;
 
 /// How far a camera that is held has rolled between any two instants, one standard deviation in radians: twice that is 11 degrees,
 /// at which a picture is plainly askew.
 const HELD_RAD: f32 = 0.1;
+/// Offset that a gyro may well have, one standard deviation in rad/s: cameras at rest have shown 5 and 18 mrad/s. (Data sheets only promise ten
+/// times that.)
+const LIKELY_RAD_S: f32 = 0.03;
+/// So many of these deviations are no offset of a camera that is held.
+const NOT_HELD: f32 = 3.0;
 /// Seconds beyond which what was heard first counts less and less: an offset wanders with the temperature.
 const LONGEST_S: f32 = 60.0;
 /// No offset is known better than this, in rad/s: a degree of temperature moves that of the MPU-6150 by as much (its data sheet:
@@ -49,6 +55,11 @@ impl Roll {
     pub fn offset(self, sigma_rad_s: f32) -> (f32, f32) {
         // Both multiplied by the time, which may be none.
         let (mean, stated) = (HELD_RAD, sigma_rad_s * self.time_s);
+        let likely = sigma_rad_s.min(LIKELY_RAD_S) * self.time_s;
+        if self.angle_rad.abs() > NOT_HELD * sqrt(likely * likely + mean * mean) {
+            // It rolls round, and what it has turned by says nothing about the offset.
+            return (0.0, sigma_rad_s.max(LEAST_SIGMA_RAD_S));
+        }
         let both = sqrt(mean * mean + stated * stated);
         let weight = stated / both;
         let mean_rad_s = if self.time_s > 0.0 { self.angle_rad / self.time_s } else { 0.0 };
@@ -86,6 +97,14 @@ mod tests {
         let cold = minutes(Roll::NONE, 0.02, 60);
         let (offset_rad_s, sigma_rad_s) = minutes(cold, 0.03, 5).offset(0.2);
         assert!((offset_rad_s - 0.03).abs() < sigma_rad_s, "{offset_rad_s} +/- {sigma_rad_s}");
+    }
+
+    #[test]
+    fn a_camera_that_rolls_round_tells_no_offset() {
+        let second = || Roll::at(0.3, 1_000_000);
+        let roll = (0..20).fold(Roll::NONE, |roll, _| roll.and(second()));
+        assert_eq!(roll.offset(0.2), (0.0, 0.2));
+        assert_eq!(roll.offset(3e-3), (0.0, 3e-3));
     }
 
     #[test]

@@ -81,7 +81,7 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
     let ignored = with_tachometer(settings, args.how.capacity, |tachometer| {
         let (mut chunk, mut ties) = (Vec::<Event>::new(), Ties::default());
         let mut rolls: Vec<GyroSample> = Vec::new();
-        let mut origin_us = None;
+        let (mut origin_us, mut has_gyro) = (None, false);
         let (mut known_lost, mut measured) = (0, None::<(u64, u64)>);
         loop {
             chunk.clear();
@@ -110,6 +110,7 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
             let samples = recording.take_imu();
             if args.gyro {
                 rolls.extend(samples.iter().map(ImuSample::roll));
+                has_gyro |= !samples.is_empty();
             }
             let mut ahead = &rolls[..];
             feed(tachometer, &chunk, &mut ahead, |reading| readings.push(reading));
@@ -118,6 +119,9 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
             if !more {
                 break;
             }
+        }
+        if args.gyro && !has_gyro {
+            eprintln!("{name}: no gyro samples; speeds are relative to the camera");
         }
         (facts.first_us, facts.last_us) = measured.unwrap_or_default();
         tachometer.finish();
