@@ -47,9 +47,13 @@ fn recordings() -> Vec<Vec<Event>> {
     .collect()
 }
 
+fn settings(width_px: u16, height_px: u16) -> Settings {
+    Settings::new(Geometry::new(width_px, height_px).expect("a sensor in range"))
+}
+
 /// The one rotor of a recording, and its speed.
 fn measure_in(events: &[Event], width_px: u16, height_px: u16) -> (RotorReading, Speed) {
-    let settings = Settings::new(Geometry::new(width_px, height_px).expect("a sensor in range"));
+    let settings = settings(width_px, height_px);
     let (readings, _) = measure_events(events, &[], settings, Capacity::Full);
     let span_us = events[0].t_us..events[events.len() - 1].t_us;
     let summary = summarise(&readings, &span_us, settings.clock_sigma_ppm);
@@ -187,9 +191,7 @@ fn the_order_of_simultaneous_events_does_not_matter() {
 fn the_rhythm_of_pushing_and_polling_changes_no_bit() {
     for events in recordings() {
         let series = |piece_events: usize, steps: u32| {
-            let settings =
-                Settings::new(Geometry::new(WIDTH_PX, HEIGHT_PX).expect("a sensor in range"));
-            with_tachometer(settings, Capacity::Device, |tachometer| {
+            with_tachometer(settings(WIDTH_PX, HEIGHT_PX), Capacity::Device, |tachometer| {
                 let mut readings = Vec::new();
                 for piece in events.chunks(piece_events) {
                     tachometer.push(piece);
@@ -229,9 +231,7 @@ fn a_measurement_that_lasts_long_leaves_all_that_came_meanwhile_to_the_next() {
         let (width_px, height_px, rotors) = (WIDTH_PX, HEIGHT_PX, vec![rotor]);
         let scene = Scene { width_px, height_px, duration_ms: 3_000.0, rotors, ..Scene::default() };
         let events = generate(&scene).expect("a scene in range").events;
-        let settings =
-            Settings::new(Geometry::new(WIDTH_PX, HEIGHT_PX).expect("a sensor in range"));
-        with_tachometer(settings, Capacity::Device, |tachometer| {
+        with_tachometer(settings(WIDTH_PX, HEIGHT_PX), Capacity::Device, |tachometer| {
             let mut readings = Vec::new();
             for piece in events.chunks(piece_events) {
                 tachometer.push(piece);
