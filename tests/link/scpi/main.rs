@@ -1,17 +1,17 @@
 //! SCPI as a person types it: what is answered, what is refused, and that nothing hangs.
 
-#[path = "bench.rs"]
+#[path = "../bench.rs"]
 mod bench;
+mod log;
+mod recording;
 
 use bench::{Bench, drain, exchange};
-use evtach_core::{
-    Event, Evidence, Frame, Geometry, Polarity, Reading, Reason, RotorReading, Speed, Status,
-};
+use evtach_core::{Evidence, Frame, Reading, Reason, RotorReading, Speed, Status};
 use evtach_firmware::instrument::{Fault, Sensor, Unit};
-use evtach_firmware::record::{Decoder, Header};
-use evtach_firmware::scpi::{ErrorCode, LINE_BYTES, Link, LogLine, READING_TIMEOUT_US, Statistics};
+use evtach_firmware::scpi::{ErrorCode, LINE_BYTES, Link, READING_TIMEOUT_US, Statistics};
 use evtach_firmware::sensor::usb::Trouble;
 use proptest::prelude::*;
+use recording::block;
 
 fn rotor(id: u8, rpm: f32) -> RotorReading {
     RotorReading {
@@ -263,77 +263,6 @@ fn control_c_ends_whatever_is_under_way() {
     assert_eq!(session.ask("*OPC?"), "1\n");
 }
 
-fn events(count: u64) -> Vec<Event> {
-    (0..count)
-        // Every byte there is, newlines too.
-        .map(|index| Event { t_us: index, x: 10, y: 0x0a, polarity: Polarity::On })
-        .collect()
-}
-
-impl Bench {
-    /// A recording of so many events that has ended.
-    fn start(&mut self, count: u64) {
-        evtach_firmware::scpi::Device::start_recording(self, count as u32).expect("room");
-        self.record(&events(count));
-    }
-}
-
-/// A definite length block (IEEE 488.2, 8.7.9) and what follows it.
-fn block(answer: &[u8]) -> (&[u8], &[u8]) {
-    assert_eq!(answer[0], b'#');
-    let digits = usize::from(answer[1] - b'0');
-    let length: usize =
-        std::str::from_utf8(&answer[2..2 + digits]).expect("digits").parse().expect("a length");
-    answer[2 + digits..].split_at(length)
-}
-
-#[test]
-fn a_recording_is_fetched_as_a_block() {
-    let mut session = Session::new();
-    assert_eq!(session.ask("DATA:REC:STAT?;CAP?;EVEN?"), "IDLE;100;0\n");
-    assert_eq!(session.ask("DATA:REC:STAR;STAT?;:STAT:OPER:COND?"), "RUN;784\n");
-    session.bench.record(&events(60));
-    assert_eq!(session.ask("DATA:REC?"), "");
-    assert_eq!(session.error(), -221, "it still runs");
-    assert_eq!(session.ask("DATA:REC:STOP;STAT?;EVEN?"), "IDLE;60\n");
-    assert_eq!(session.ask("DATA:REC:STAR 50;STAT?"), "RUN\n");
-    session.bench.record(&events(60));
-    assert_eq!(session.ask("DATA:REC:STAT?;EVEN?"), "FULL;50\n");
-    let Session { link, bench } = &mut session;
-    let answer = exchange(link, bench, b"*OPC?;:DATA:REC?;*OPC?\n", 0);
-    let (file, rest) = block(answer.strip_prefix(b"1;").expect("the answer before"));
-    assert_eq!(rest, b";1\n");
-    let (header, body) = file.split_first_chunk().expect("a header");
-    let header = Header::parse(header).expect("a header");
-    assert_eq!((header.events, Some(header.geometry)), (50, Geometry::new(320, 240)));
-    let mut decoder = Decoder::new(header.first_us);
-    let found: Vec<Event> =
-        body.as_chunks().0.iter().map(|&record| decoder.decode(record)).collect();
-    assert_eq!(found, events(50));
-}
-
-#[test]
-fn a_memory_that_fails_is_told_and_the_block_keeps_its_length() {
-    let mut session = Session::new();
-    session.bench.start(10);
-    session.bench.recorder = None;
-    assert_eq!(session.ask("DATA:REC?"), "");
-    assert_eq!(session.error(), -241);
-    assert_eq!(session.ask("DATA:REC:STAT?"), "ABSENT\n");
-
-    let mut session = Session::new();
-    session.bench.start(10);
-    let Session { link, bench } = &mut session;
-    link.receive(b"DATA:REC?\n");
-    link.run(0, bench);
-    let mut head = [0; 5];
-    assert_eq!(link.transmit(&mut head, bench), 5);
-    bench.recorder = None;
-    let rest = drain(link, bench, 0);
-    assert_eq!(block(&[head.as_slice(), &rest].concat()), ([0; 104].as_slice(), b"\n".as_slice()));
-    assert_eq!(session.error(), -240);
-}
-
 #[test]
 fn headers_are_listed_and_in_the_manual() {
     let mut session = Session::new();
@@ -397,96 +326,7 @@ fn statistics_are_collected_elsewhere_and_told_here() {
     assert_eq!(answer, "110.0;90.0;100.0;7;12.5;0\n");
 }
 
-#[test]
-fn the_log_tells_each_reading_once_between_answers() {
-    let mut session = Session::new();
-    assert_eq!(session.ask("SYST:LOG ON"), "");
-    let Session { link, bench } = &mut session;
-    bench.first_us = 1_000_000;
-    bench.show(reading(&[rotor(0, 3000.0)]));
-    let line = drain(link, bench, 0);
-    assert!(line.starts_with(b"{\"t_s\":0.234567,") && line.ends_with(b"}\n"));
-    assert_eq!(drain(link, bench, 0), b"", "once");
-    link.receive(b"*OPC?;*OPC?\n");
-    bench.show(reading(&[rotor(0, 3000.0)]));
-    let both = drain(link, bench, 0);
-    assert!(both.starts_with(b"1;1\n{\"t_s\""), "{}", both.escape_ascii());
-    // Measuring took so long that the sensor is silent by now.
-    bench.stale = true;
-    bench.show(reading(&[rotor(0, 3000.0)]));
-    assert!(drain(link, bench, 0).starts_with(b"{\"t_s\""));
-    bench.stale = false;
-    assert_eq!(session.ask("SYST:LOG OFF"), "");
-    session.bench.show(reading(&[rotor(0, 3000.0)]));
-    assert_eq!(session.ask(""), "");
-}
-
-#[test]
-fn the_longest_log_line_and_answer_fit() {
-    let mut session = Session::new();
-    let rotors: Vec<RotorReading> = (0..8)
-        .map(|index| {
-            let speed = Speed {
-                omega_rad_s: -12_345.678,
-                omega_sigma_rad_s: 1.234_567_8e-3,
-                alpha_rad_s2: Some(-9_876.543),
-                frame: Frame::Camera,
-            };
-            RotorReading {
-                x_px: 1_234.567_9,
-                y_px: 1_234.567_9,
-                radius_px: 1_234.567_9,
-                status: Status::Coarse,
-                speed: Some(speed),
-                ..rotor(index + 100, 1.0)
-            }
-        })
-        .collect();
-    session.ask("SYST:LOG ON");
-    session.bench.show(Reading { t_us: u64::MAX, ..reading(&rotors) });
-    assert!(session.ask("").ends_with("}\n"));
-    assert!(session.ask("FETC:ALL?").len() > 300);
-    assert_eq!(session.error(), 0);
-}
-
-/// What JSON numbers are compared with.
-fn any_rotor() -> impl Strategy<Value = RotorReading> {
-    let float = || -1e5_f32..1e5;
-    let speed = (float(), 1e-6_f32..10.0, prop::option::of(float())).prop_map(
-        |(omega_rad_s, omega_sigma_rad_s, alpha_rad_s2)| Speed {
-            omega_rad_s,
-            omega_sigma_rad_s,
-            alpha_rad_s2,
-            frame: Frame::Room,
-        },
-    );
-    (any::<u8>(), float(), float(), prop::option::of(speed), prop::sample::select(&Reason::ALL))
-        .prop_map(|(id, x_px, radius_px, speed, reason)| RotorReading {
-            x_px,
-            radius_px,
-            status: if speed.is_some() { Status::Coarse } else { Status::Refused(reason) },
-            speed,
-            ..rotor(id, 0.0)
-        })
-}
-
 proptest! {
-    #[test]
-    fn a_log_line_is_an_element_of_the_json_of_measure(
-        rotors in prop::collection::vec(any_rotor(), 0..=8),
-        t_us in 0_u64..1 << 50,
-        first_us in 0_u64..1 << 50,
-        window_us in any::<u32>(),
-    ) {
-        let reading = Reading { t_us, window_us, ..reading(&rotors) };
-        let line = LogLine { reading: &reading, first_us }.to_string();
-        let on_device: serde_json::Value = serde_json::from_str(&line).expect("JSON");
-        let row = evtach_host::measure::ReadingRow::new(&reading, first_us);
-        let on_pc: serde_json::Value =
-            serde_json::from_str(&serde_json::to_string(&row).expect("JSON")).expect("JSON");
-        prop_assert_eq!(on_device, on_pc);
-    }
-
     #[test]
     fn any_bytes_leave_a_link_that_answers(
         bytes in prop::collection::vec(
