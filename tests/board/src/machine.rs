@@ -321,6 +321,12 @@ impl Machine {
         self.memories.break_sdram(&mut self.engine, offset)
     }
 
+    /// Someone has mended SDRAM and crystal.
+    pub fn mend(&mut self) {
+        self.memories.mend_sdram();
+        self.board.borrow_mut().rcc.mend_crystal();
+    }
+
     fn enter(&mut self, exception: u16) {
         let mut board = self.board.borrow_mut();
         let vtor = board.system.vtor;

@@ -1,5 +1,8 @@
 //! The memories: which are there, and what is in them.
 
+use std::cell::Cell;
+use std::rc::Rc;
+
 use anyhow::{Result, anyhow, bail};
 use unicorn_engine::unicorn_const::{HookType, MemType, Permission};
 use unicorn_engine::{Unicorn, uc_error};
@@ -42,7 +45,8 @@ impl Memory for Ram<'_> {
 pub struct Memories {
     sdram_on: bool,
     mapped: bool,
-    broken: bool,
+    /// Where SDRAM is broken.
+    broken: Rc<Cell<Option<u32>>>,
 }
 
 impl Memories {
@@ -102,18 +106,19 @@ impl Memories {
         Ok(())
     }
 
-    /// A bit of SDRAM that reads as zero from now on.
+    /// A bit of SDRAM that reads as zero from now on, until it is mended.
     ///
     /// # Errors
     /// When one is broken already, or the engine takes no more hooks.
     pub fn break_sdram(&mut self, engine: &mut Engine, offset: u32) -> Result<()> {
-        if std::mem::replace(&mut self.broken, true) {
+        if self.broken.replace(Some(offset)).is_some() {
             bail!("one word is broken already");
         }
+        let broken = Rc::clone(&self.broken);
         let at = u64::from(SDRAM + (offset & !3));
         let hook = move |engine: &mut Unicorn<'_, ()>, _: MemType, _: u64, _: usize, _: i64| {
             let mut word = [0; 4];
-            if engine.mem_read(at, &mut word).is_ok() {
+            if broken.get() == Some(offset) && engine.mem_read(at, &mut word).is_ok() {
                 word[1] &= !0x10;
                 // It has just been read.
                 let _ = engine.mem_write(at, &word);
@@ -125,5 +130,10 @@ impl Memories {
             // What was translated before reads past the hook.
             .and_then(|_| engine.ctl_flush_tb())
             .map_err(|error| anyhow!("the engine: {error:?}"))
+    }
+
+    /// The SDRAM is as good as new.
+    pub fn mend_sdram(&self) {
+        self.broken.set(None);
     }
 }

@@ -17,7 +17,8 @@
 //! | `lcd FILE.png`, `log FILE` | what is on the panel; what the device logged so far |
 //! | `pc plug`, `pc unplug` | the cable of the PC |
 //! | `break_sdram OFFSET` | one bit of SDRAM reads as zero |
-//! | `stop_crystal` | the crystal stops, for good |
+//! | `stop_crystal` | the crystal stops |
+//! | `mend` | SDRAM and crystal are as good as new |
 //! | `flash OFFSET FILE` | a programmer writes a file into the serial flash |
 //! | `power_cut`, `power_cut_writing` | power goes and comes back; in the middle of the next write to the serial flash |
 //! | `reset` | the black button |
@@ -178,6 +179,7 @@ impl Script {
                 board.clocks_changed();
                 board.disturbed();
             }
+            "mend" => self.machine.mend(),
             "flash" => {
                 let (at, path) =
                     rest.split_once(' ').ok_or_else(|| anyhow!("flash OFFSET FILE"))?;

@@ -4,6 +4,7 @@ mod board;
 mod boot;
 mod camera;
 mod faults;
+mod flood;
 mod minute;
 mod replay;
 mod walk;

@@ -13,6 +13,9 @@ const SECONDS: u32 = 60;
 /// Rotations a minute: 48 ms a turn.
 const RPM: f64 = 1250.0;
 
+/// Most that all handlers may take together, in million instructions a second, of 216.
+const MOST_LOAD: f64 = 200.0;
+
 /// Time after which the recording comes again: 20 turns.
 const PERIOD_S: f64 = 0.96;
 
@@ -92,6 +95,16 @@ fn a_minute_of_a_million_events_a_second_is_accounted_for_and_none_is_lost() {
         table.push_str(&format!("\n  {handler:16} {load:7.2}"));
     }
     show(&table);
+    // Taking in, the front, measuring, both USB cores, time: each is there, and together they leave some of the processor.
+    let loads = loads(&before, &after);
+    for name in ["UART4", "UART5", "UART7", "OTG_HS", "OTG_FS", "TIM8_BRK_TIM12"] {
+        assert!(
+            loads.iter().any(|(handler, load)| handler == name && *load > 0.0),
+            "{name}: {loads:?}"
+        );
+    }
+    let together: f64 = loads.iter().map(|(_, load)| load).sum();
+    assert!(together < MOST_LOAD, "{together} million instructions a second");
     assert!(seen > 1_000_000 * u64::from(SECONDS), "{camera}");
     assert_eq!((&camera["filtered"], &camera["dropped"]), (&0.into(), &0.into()), "{camera}");
     assert_eq!(used + thinned + late + lost_before + overrun, seen);

@@ -114,7 +114,12 @@ impl Rcc {
         source * u64::from(n) / u64::from(m.max(1)) / u64::from(p)
     }
 
-    /// The crystal stops, for good. Whether the chip's clock security system notices: it goes on at its own oscillator then, and
+    /// The crystal swings again when it is next switched on.
+    pub fn mend_crystal(&mut self) {
+        self.still = false;
+    }
+
+    /// The crystal stops, until it is mended. Whether the chip's clock security system notices: it goes on at its own oscillator then, and
     /// raises the non-maskable interrupt.
     pub fn stop_crystal(&mut self) -> bool {
         self.still = true;
