@@ -23,7 +23,7 @@ macro_rules! errors {
 
             /// The standard's number.
             #[must_use]
-            pub const fn number(self) -> i16 {
+            pub const fn number(self) -> i32 {
                 match self { $(Self::$name => $number,)+ }
             }
 
