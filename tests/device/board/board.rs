@@ -10,6 +10,9 @@ use evtach_host::frame::Frame;
 use evtach_tests::{Loaded, show};
 use serde_json::Value;
 
+/// Least of the stack that is never used.
+const STACK_SPARE_BYTES: u64 = 1024;
+
 /// A camera that can be plugged in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Camera {
@@ -254,7 +257,8 @@ impl Board {
         self.say(what);
     }
 
-    /// Nothing went wrong that nobody asked for: no fault of the processor, no reset, no register that is not modelled.
+    /// Nothing went wrong that nobody asked for: no fault of the processor, no reset, no register that is not modelled, and the stack
+    /// was never nearly used up.
     pub fn assert_sound(&mut self) {
         let report = self.report();
         for empty in ["faults", "remarks", "unknown_registers", "unknown_flash_commands"] {
@@ -262,6 +266,9 @@ impl Board {
         }
         assert_eq!(report["resets"], serde_json::json!(["Power"]), "{report}");
         assert_eq!(report["toggle_errors"], 0, "{report}");
+        let untouched = report["stack_untouched_bytes"].as_u64();
+        show(&format!("stack: {untouched:?} B never used"));
+        assert!(untouched > Some(STACK_SPARE_BYTES), "{report}");
     }
 }
 

@@ -148,26 +148,6 @@ impl DrawTarget for Panel {
         Ok(())
     }
 
-    fn fill_contiguous<I>(&mut self, area: &Rectangle, colours: I) -> Result<(), Infallible>
-    where
-        I: IntoIterator<Item = Rgb565>,
-    {
-        if area.intersection(&self.bounding_box()) != *area {
-            return self.draw_iter(area.points().zip(colours).map(|(at, c)| Pixel(at, c)));
-        }
-        self.begin();
-        let (columns, rows) = spans(area);
-        let mut colours = colours.into_iter();
-        'all: for y in rows.clone() {
-            for x in columns.clone() {
-                let Some(colour) = colours.next() else { break 'all };
-                self.set(x, y, colour);
-            }
-        }
-        self.end(rows);
-        Ok(())
-    }
-
     fn fill_solid(&mut self, area: &Rectangle, colour: Rgb565) -> Result<(), Infallible> {
         self.begin();
         let (columns, rows) = spans(&area.intersection(&self.bounding_box()));
