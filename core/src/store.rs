@@ -10,6 +10,7 @@
 //! its memory is a reservoir thinned evenly (what a long baseline needs): every 2^s-th event, s growing as
 //! the reservoir fills. What is kept depends on the events and the capacity alone, never on when a task ran.
 
+mod company;
 mod even;
 mod event;
 mod lengthen;
@@ -23,6 +24,7 @@ pub use event::StoredEvent;
 pub use roll::Roll;
 pub use window::{Account, Window};
 
+use company::Company;
 use open::Segment;
 
 /// Segments in a window.
@@ -51,6 +53,8 @@ pub struct Store<'m> {
     given_up: u64,
     segment_us: u32,
     thinned: u64,
+    /// What tells the noise in the open segment.
+    company: Company,
     /// The camera's roll in all segments that went by, and in those given up behind the ones that are measured.
     rolled: Roll,
     rolled_behind: Roll,
@@ -73,6 +77,7 @@ impl<'m> Store<'m> {
             given_up: 0,
             segment_us: segment_us.max(1),
             thinned: 0,
+            company: Company::NONE,
             rolled: Roll::NONE,
             rolled_behind: Roll::NONE,
         }
@@ -87,6 +92,7 @@ impl<'m> Store<'m> {
         self.given_up = 0;
         self.segment_us = segment_us.max(1);
         self.rolled_behind = Roll::NONE;
+        self.company.clear();
         unmeasured
     }
 
@@ -195,6 +201,7 @@ impl<'m> Store<'m> {
         self.closed += 1;
         let slot = self.slot(self.closed);
         self.segments[slot] = Segment::after(&before, self.capacity);
+        self.company.clear();
     }
 
     /// Moves on from the oldest closed segment.

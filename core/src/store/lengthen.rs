@@ -47,9 +47,12 @@ impl Store<'_> {
                     }
                 }
                 // An old segment that is split gives each part of its count as it gives events.
-                let share =
-                    |index: usize| segment.counted * index as u64 / segment.len.max(1) as u64;
-                merged.counted += share(index) - share(before);
+                let share = |all: u64, index: usize| all * index as u64 / segment.len.max(1) as u64;
+                let part = |all: u64| share(all, index) - share(all, before);
+                merged.counted += part(segment.counted);
+                merged.alone += part(segment.alone);
+                // As the open one, which is the last, goes on.
+                (merged.crowded, merged.noisy) = (segment.crowded, segment.noisy);
                 if index < segment.len {
                     break;
                 }

@@ -18,6 +18,8 @@ pub(super) struct Segment {
     pub len: usize,
     /// Events that came, each for as many as it stands for.
     pub counted: u64,
+    /// Of these, noise that was left out.
+    pub alone: u64,
     /// Events that were handed in and that no window has measured yet.
     pub unmeasured: u32,
     /// Events that were lost before.
@@ -30,6 +32,9 @@ pub(super) struct Segment {
     pub skip: u32,
     /// Most that an event stood for when it came, as a power of two.
     pub heaviest_log2: u8,
+    /// Whether more events are expected than are kept, and whether, behind the burst, those that are alone are left out: most are.
+    pub crowded: bool,
+    pub noisy: bool,
 }
 
 impl Segment {
@@ -37,9 +42,19 @@ impl Segment {
     /// before. The same is kept as if it began with every event, but for the work of thinning them; where so few come that it need not
     /// have been so sparse, fewer are.
     pub fn after(before: &Self, capacity: usize) -> Self {
-        let overfull = before.counted.checked_div(capacity as u64).unwrap_or(0);
-        let stride_log2 = overfull.checked_ilog2().unwrap_or(0) as u8;
-        Self { stride_log2: stride_log2.min(MOST_WEIGHT_LOG2), ..Self::default() }
+        let overfull_log2 = |events: u64| {
+            let overfull = events.checked_div(capacity as u64).unwrap_or(0);
+            overfull.checked_ilog2().unwrap_or(0) as u8
+        };
+        let stride_log2 = overfull_log2(before.counted.saturating_sub(before.alone));
+        let crowded = overfull_log2(before.counted) > 0;
+        Self {
+            stride_log2: stride_log2.min(MOST_WEIGHT_LOG2),
+            crowded,
+            // Until its own burst tells.
+            noisy: crowded && before.noisy,
+            ..Self::default()
+        }
     }
 
     /// How many events the next that is kept stands for, as a power of two, and the place up to which that holds.
@@ -70,7 +85,12 @@ impl Store<'_> {
         // What is to be passed over, in these events, and what is left of it that is less than one stands for.
         let (mut next, mut rest) = ((skip >> weight_log2) as usize, skip);
         let mut count = 0;
-        while next < events.len() {
+        let mut leaves_noise = self.leaves_noise(slot);
+        if leaves_noise {
+            // Only what is in company is passed over.
+            next = 0;
+        }
+        while next < events.len() && !leaves_noise {
             if self.segments[slot].len >= self.capacity {
                 self.make_room(slot);
             }
@@ -94,17 +114,87 @@ impl Store<'_> {
                 break;
             }
             segment.len += count - before;
+            if segment.crowded && step_log2 == 0 {
+                self.probe(slot, &events[next..next + count - before]);
+                leaves_noise = self.leaves_noise(slot);
+            }
             next += (count - before) << stride_log2;
             rest = (1 << step_log2) - 1;
         }
+        if leaves_noise {
+            count +=
+                self.push_in_company(slot, &events[next.min(events.len())..], weight_log2, kept);
+        } else {
+            rest &= (1 << weight_log2) - 1;
+            let skip = (next.saturating_sub(events.len()) as u32) << weight_log2 | rest;
+            self.segments[slot].skip = skip;
+        }
         let segment = &mut self.segments[slot];
         segment.heaviest_log2 = segment.heaviest_log2.max(weight_log2);
-        rest &= (1 << weight_log2) - 1;
-        segment.skip = (next.saturating_sub(events.len()) as u32) << weight_log2 | rest;
         let arrived = (events.len() as u64) << weight_log2;
         segment.counted += arrived;
         segment.unmeasured = segment.unmeasured.saturating_add(events.len() as u32);
         self.thinned += arrived - count as u64;
+    }
+
+    /// Whether what is alone is left out from here on.
+    const fn leaves_noise(&self, slot: usize) -> bool {
+        let segment = &self.segments[slot];
+        segment.noisy && segment.len >= as_they_came(self.capacity, 0)
+    }
+
+    /// Looks at events of the burst whether most are noise.
+    #[inline(never)]
+    fn probe(&mut self, slot: usize, burst: &[PackedEvent]) {
+        let segment = &mut self.segments[slot];
+        if let Some(noisy) = self.company.probe(burst, segment.noisy) {
+            segment.noisy = noisy;
+        }
+    }
+
+    /// Takes in events behind the burst of which those that are alone are left out; returns how many it keeps.
+    #[inline(never)]
+    fn push_in_company(
+        &mut self,
+        slot: usize,
+        events: &[PackedEvent],
+        weight_log2: u8,
+        mut kept: impl FnMut(PackedEvent, u8),
+    ) -> usize {
+        let mut skip = self.segments[slot].skip >> weight_log2;
+        let (mut count, mut in_company, mut rest) = (0, 0, events);
+        while !rest.is_empty() {
+            let (moment, later) = self.company.moment(rest);
+            for event in moment {
+                if !self.company.meets(*event) {
+                    continue;
+                }
+                in_company += 1;
+                if skip > 0 {
+                    skip -= 1;
+                    continue;
+                }
+                if self.segments[slot].len >= self.capacity {
+                    self.make_room(slot);
+                }
+                let segment = &mut self.segments[slot];
+                let stands_log2 = segment.step(self.capacity).0.max(weight_log2);
+                let place = self.events.get_mut(slot * self.capacity + segment.len);
+                if let Some(place) = place {
+                    *place = StoredEvent::store(*event, stands_log2);
+                    kept(*event, stands_log2);
+                    segment.len += 1;
+                    count += 1;
+                    skip = (1_u32 << (stands_log2 - weight_log2)) - 1;
+                }
+            }
+            self.company.pass(moment);
+            rest = later;
+        }
+        let segment = &mut self.segments[slot];
+        segment.skip = skip << weight_log2;
+        segment.alone += ((events.len() - in_company) as u64) << weight_log2;
+        count
     }
 
     /// Makes room in a full segment: every other event behind the burst goes.

@@ -1,0 +1,234 @@
+//! Events that are alone: noise, which a store that is too small for all that comes need not keep.
+//!
+//! What moves fires pixels side by side, one after the other; noise fires one here, one there. So an event is in company where
+//! another came nearby a moment ago. A moment is so many events, not so long a time: whatever the rate, an event that
+//! has nothing to do with the others meets one by chance as rarely. What an edge leaves thus never becomes a smaller share of what is
+//! kept, and mostly a larger one.
+
+use crate::event::PackedEvent;
+
+/// Side in pixels of a cell, within which events are near each other, as a power of two: an edge leaves several in it.
+const SIDE_LOG2: u32 = 2;
+/// Columns and rows of cells that are told apart, as powers of two; beyond, they repeat. 512 bytes: all that is left of the
+/// device's memory.
+const COLUMNS_LOG2: u32 = 6;
+const ROWS_LOG2: u32 = 5;
+const CELLS: usize = 1 << (COLUMNS_LOG2 + ROWS_LOG2);
+const WORDS: usize = CELLS / u32::BITS as usize;
+/// Events in a moment, on average: so few that one in six unrelated ones meets another, in this moment or the one before.
+const MOMENT: usize = CELLS / 8;
+/// Events in a row that tell whether most of what comes is noise.
+const PROBE: u32 = 400;
+/// How many of these lie in a cell with another where they lie anywhere, in cells of twice the side: so that a large rotor does not
+/// fill them all.
+const BY_CHANCE: u32 = PROBE * PROBE / (2 * CELLS as u32);
+/// So many times as many at most, where most is noise; and where it was in the segment before, so that it is not left out by turns.
+const MOST_TIMES: u32 = 3;
+const STILL_TIMES: u32 = 4;
+
+/// Cells, a bit each, in which events came in this moment and in the one before.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    now: u32,
+    before: u32,
+}
+
+impl Seen {
+    const NOTHING: Self = Self { now: 0, before: 0 };
+}
+
+/// Where events came a moment ago.
+#[derive(Debug)]
+pub(super) struct Company {
+    seen: [Seen; WORDS],
+    /// Events until the moment ends.
+    left: usize,
+    /// Events of the probe, and those of them that met another.
+    probed: u32,
+    met: u32,
+}
+
+impl Company {
+    pub const NONE: Self = Self { seen: [Seen::NOTHING; WORDS], left: MOMENT, probed: 0, met: 0 };
+
+    /// Starts over, with a probe.
+    pub fn clear(&mut self) {
+        // In place: flash holds no copy of it.
+        (self.probed, self.met) = (0, 0);
+        self.seen.fill(Seen::NOTHING);
+    }
+
+    /// As many of the events as the moment has left.
+    pub fn moment<'e>(&self, events: &'e [PackedEvent]) -> (&'e [PackedEvent], &'e [PackedEvent]) {
+        events.split_at(events.len().min(self.left))
+    }
+
+    /// Whether another event came near this one a moment ago.
+    #[inline(always)]
+    pub fn meets(&mut self, event: PackedEvent) -> bool {
+        let (word, bit) = place(event, SIDE_LOG2);
+        let seen = &mut self.seen[word];
+        let met = (seen.now | seen.before) & bit != 0;
+        seen.now |= bit;
+        met
+    }
+
+    /// These events of the moment went by. Where it is over, the next is half to three halves as long, by the digits of the time: were
+    /// they all alike, noise would come and go with them, and that is a frequency.
+    pub fn pass(&mut self, moment: &[PackedEvent]) {
+        self.left = self.left.saturating_sub(moment.len());
+        if let (0, Some(last)) = (self.left, moment.last()) {
+            for seen in &mut self.seen {
+                *seen = Seen { now: 0, before: seen.now };
+            }
+            let digits = last.low_us().wrapping_mul(0x9E37_79B9) >> (32 - MOMENT.ilog2());
+            self.left = MOMENT / 2 + digits as usize;
+        }
+    }
+
+    /// Takes in consecutive events; once there are enough, whether most of what comes is noise, as it was in the segment before or not.
+    pub fn probe(&mut self, events: &[PackedEvent], was_noisy: bool) -> Option<bool> {
+        if self.probed >= PROBE {
+            return None;
+        }
+        for event in events.iter().take((PROBE - self.probed) as usize) {
+            let (word, bit) = place(*event, SIDE_LOG2 + 1);
+            let seen = &mut self.seen[word];
+            self.met += u32::from(seen.now & bit != 0);
+            seen.now |= bit;
+            self.probed += 1;
+        }
+        if self.probed < PROBE {
+            return None;
+        }
+        self.seen.fill(Seen::NOTHING);
+        let times = if was_noisy { STILL_TIMES } else { MOST_TIMES };
+        Some(self.met < times * BY_CHANCE)
+    }
+}
+
+/// Word and bit of the cell that an event lies in.
+#[inline(always)]
+const fn place(event: PackedEvent, side_log2: u32) -> (usize, u32) {
+    let (x, y) = event.pixel();
+    let column = x as u32 >> side_log2 & ((1 << COLUMNS_LOG2) - 1);
+    let row = y as u32 >> side_log2 & ((1 << ROWS_LOG2) - 1);
+    ((row << (COLUMNS_LOG2 - 5) | column >> 5) as usize % WORDS, 1 << (column & 31))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::event::Polarity;
+    use crate::store::{Even, MOST_SEGMENTS, MOST_SPARE, Store, StoredEvent};
+
+    /// A number that looks random.
+    fn mixed(index: u64) -> u64 {
+        let mixed = (index + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        let mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB) >> 20
+    }
+
+    fn noise(index: u64) -> PackedEvent {
+        let place = mixed(index);
+        PackedEvent::new(
+            index as u32,
+            (place % 346) as u16,
+            (place / 346 % 260) as u16,
+            Polarity::Off,
+        )
+    }
+
+    /// An upright edge of 60 pixels that moves to the right by a pixel in 1 000 events, a twentieth of which it leaves.
+    fn scene(index: u64) -> PackedEvent {
+        if !mixed(index).is_multiple_of(20) {
+            return noise(index);
+        }
+        let x = 100 + index / 1_000 % 60;
+        PackedEvent::new(index as u32, x as u16, 90 + (mixed(index) / 32 % 60) as u16, Polarity::On)
+    }
+
+    #[test]
+    fn noise_is_alone_and_an_edge_is_in_company() {
+        let mut company = Company::NONE;
+        let (mut met, mut all) = ([0; 2], [0; 2]);
+        for event in (0..50_000).map(scene) {
+            let edge = usize::from(event.is_brighter());
+            met[edge] += u32::from(company.meets(event));
+            all[edge] += 1;
+            company.pass(&[event]);
+        }
+        assert!(met[0] * 4 < all[0], "{met:?} of {all:?}");
+        assert!(met[1] * 2 > all[1], "{met:?} of {all:?}");
+    }
+
+    #[test]
+    fn a_probe_tells_noise_from_what_moves() {
+        for from in [0, 1_000, 10_000] {
+            for was_noisy in [false, true] {
+                let events: Vec<_> = (from..from + 1_000).map(noise).collect();
+                let mut company = Company::NONE;
+                assert_eq!(company.probe(&events[..300], was_noisy), None);
+                assert_eq!(company.probe(&events[300..450], was_noisy), Some(true));
+                assert_eq!(company.probe(&events[450..], was_noisy), None, "once is enough");
+                // A wheel that fills a fifth of the picture.
+                let wheel = (20 * from..).map(noise).filter(|event| {
+                    let (x, y) = event.pixel();
+                    let (dx, dy) = (i32::from(x) - 173, i32::from(y) - 130);
+                    dx * dx + dy * dy < 80 * 80
+                });
+                let wheel: Vec<_> = wheel.take(400).collect();
+                company.clear();
+                assert_eq!(company.probe(&wheel, was_noisy), Some(false));
+            }
+        }
+    }
+
+    /// A store as large as the device's, after six segments of so many events; shares of the edge among what is evenly kept of it, by
+    /// segment.
+    fn shares(events: impl Fn(u64) -> PackedEvent, segment: u64) -> (Vec<f32>, u64) {
+        let mut memory = vec![StoredEvent::default(); MOST_SEGMENTS * 1_638];
+        let mut store = Store::new(&mut memory, MOST_SPARE, segment as u32);
+        for index in 0..6 * segment - 1 {
+            while index >= store.open_end_us() {
+                store.close_segment();
+            }
+            store.push(&[events(index)], 0, |_, _| {});
+        }
+        let account = store.account(6);
+        assert_eq!(account.counted, 6 * segment - 1);
+        assert_eq!(account.counted, account.kept + store.thinned());
+        let window = store.window(6, u64::MAX);
+        let mut even = Even::default();
+        let mut found = Vec::new();
+        for _ in 0..6 {
+            even.weigh(&window, |_| true);
+        }
+        for _ in 0..6 {
+            let (mut edge, mut all) = (0.0, 0.0);
+            even.step(&window, usize::MAX, Some, |_, event| {
+                edge += f32::from(u8::from(event.is_on()));
+                all += 1.0;
+            });
+            found.push(edge / all);
+        }
+        (found, account.kept)
+    }
+
+    #[test]
+    fn a_store_that_is_too_small_keeps_what_moves() {
+        let (shares, kept) = shares(scene, 30_000);
+        // It is the burst of a full segment that tells of the noise.
+        assert!(shares[0] < 0.08, "{shares:?}");
+        // Twice as much of the edge, at least.
+        assert!(shares[1..].iter().all(|share| *share > 0.1), "{shares:?}");
+        assert!(kept > 6 * 1_100, "{kept}");
+    }
+
+    #[test]
+    fn a_store_that_holds_all_keeps_the_noise() {
+        let (shares, kept) = shares(scene, 1_600);
+        assert_eq!(kept, 6 * 1_600 - 1);
+        assert!(shares.iter().all(|share| *share < 0.08), "{shares:?}");
+    }
+}
