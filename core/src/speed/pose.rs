@@ -103,6 +103,8 @@ pub struct Pose {
     coherence: f32,
     /// The same before the harmonic was raised.
     first_coherence: f32,
+    /// Share in step at twice the harmonic, where that shows although it is not followed: 0 where it does not.
+    overtone: f32,
     /// Rotor's events in the window.
     events: usize,
     /// Share of them that would be left if all were thinned as the thinnest are: the store keeps dense bursts, and blocks
@@ -143,6 +145,7 @@ impl Pose {
             phases: None,
             coherence: 0.0,
             first_coherence: 0.0,
+            overtone: 0.0,
             events: 0,
             even_share: 1.0,
             started: false,
@@ -210,7 +213,9 @@ impl Pose {
     #[must_use]
     pub fn blur_px(&self) -> f32 {
         if self.has_overtone() {
-            self.sharpness_px() * self.first_coherence.max(self.coherence)
+            // Of what is followed and what shows beside it, whichever is sharper.
+            let finer = larger(1.0, 2.0 * self.overtone / self.coherence.max(LEAST_SHARE));
+            self.sharpness_px() / finer * self.first_coherence.max(self.coherence)
         } else {
             self.sharpness_px()
         }
@@ -218,8 +223,8 @@ impl Pose {
 
     /// Whether twice the harmonic that the rotor was found by keeps step too.
     #[must_use]
-    pub const fn has_overtone(&self) -> bool {
-        self.harmonic > self.first_harmonic
+    pub fn has_overtone(&self) -> bool {
+        self.harmonic > self.first_harmonic || self.overtone > 0.0
     }
 
     /// Blocks in a symmetry period, 0 when blocks are whole periods.
@@ -331,9 +336,11 @@ impl Pose {
         }
         let at_high = sums.high.coherence(&sums.counts);
         let least = if self.is_sparse() { SPARSE_COHERENCE } else { SHARP_COHERENCE };
-        let worth = at_high > at_low
-            || fine && at_high > least * self.first_coherence && 2.0 * at_high > at_low;
-        let sharper = worth && self.may_double();
+        let shows =
+            |least: f32| fine && at_high > least * self.first_coherence && 2.0 * at_high > at_low;
+        let sharper = (at_high > at_low || shows(least)) && self.may_double();
+        // Few events show it as well as many, but a path does not follow them.
+        self.overtone = if shows(SHARP_COHERENCE) && !sharper { at_high } else { 0.0 };
         self.harmonic *= if sharper { 2 } else { 1 };
         self.coherence = if sharper { at_high } else { at_low };
         if !fine {
