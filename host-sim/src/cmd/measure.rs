@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use anyhow::{Context, bail};
 use evtach_core::{Event, GyroSample, Reading};
 use evtach_host::measure::{
-    Document, FileFacts, drain, evidence, feed, summarise, table, with_tachometer,
+    Capacity, Document, FileFacts, Ties, drain, evidence, feed, summarise, table, with_tachometer,
 };
 use evtach_host::recording::ImuSample;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -79,7 +79,7 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
     let mut readings: Vec<Reading> = Vec::new();
     let mut failure = None;
     let ignored = with_tachometer(settings, args.how.capacity, |tachometer| {
-        let mut chunk: Vec<Event> = Vec::new();
+        let (mut chunk, mut ties) = (Vec::<Event>::new(), Ties::default());
         let mut rolls: Vec<GyroSample> = Vec::new();
         let mut origin_us = None;
         let (mut known_lost, mut measured) = (0, None::<(u64, u64)>);
@@ -91,6 +91,9 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
             });
             facts.events += chunk.len() as u64;
             bar.inc(chunk.len() as u64);
+            if args.how.capacity == Capacity::Full {
+                ties.order(&mut chunk, more);
+            }
             if let Some(first) = chunk.first() {
                 let origin_us = *origin_us.get_or_insert(first.t_us);
                 let at = |seconds: f64| origin_us.saturating_add((seconds * 1e6) as u64);

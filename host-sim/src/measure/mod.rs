@@ -4,6 +4,9 @@ mod json;
 mod mean;
 mod summary;
 mod table;
+mod ties;
+
+use std::borrow::Cow;
 
 use evtach_core::Ignored;
 use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
@@ -14,6 +17,7 @@ use evtach_core::{
 pub use json::{Document, FileFacts, ReadingRow, RotorRow, letter};
 pub use summary::{Summary, summarise};
 pub use table::{evidence, table};
+pub use ties::Ties;
 
 /// How much memory the tachometer is lent: the only difference between device and PC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
@@ -122,7 +126,11 @@ pub fn measure_events(
     with_tachometer(settings, capacity, |tachometer| {
         let mut readings = Vec::new();
         let mut samples = samples;
-        feed(tachometer, events, &mut samples, |reading| readings.push(reading));
+        let mut events = Cow::from(events);
+        if capacity == Capacity::Full {
+            Ties::default().order(events.to_mut(), false);
+        }
+        feed(tachometer, &events, &mut samples, |reading| readings.push(reading));
         tachometer.finish();
         drain(tachometer, |reading| readings.push(reading));
         (readings, tachometer.ignored())

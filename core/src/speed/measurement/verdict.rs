@@ -36,6 +36,9 @@ const LOCK_AGREEMENT: f32 = 2e-3;
 const LOCK_SIGMAS: f32 = 8.0;
 /// A lock with a larger relative error is only coarse.
 const MOST_LOCK_SIGMA: f32 = 3e-3;
+/// Correlation of the witnesses' errors: the lock registers a part of the events that the phase is followed by. More than the
+/// 0.2 that is seen where both are known, as either may be biased.
+const IN_COMMON: f32 = 0.5;
 /// Share of a coarse reading's error that is left where the witnesses of the lock agree.
 const ALIKE_SIGMA: f32 = 0.2;
 /// A coarse reading's phase must give its speed and be straight within these shares, and the initial alignment of
@@ -256,18 +259,19 @@ impl Measurement {
     }
 }
 
-/// Mean weighted by the inverse variances. The witnesses look at the same events, so their errors are taken for one: it
-/// does not shrink by having two.
+/// Mean weighted by the inverse variances, of witnesses whose errors have something in common.
 // Not inlined: it is called in several places.
 #[inline(never)]
 fn combine(a: Estimate, b: Estimate) -> Estimate {
     let (va, vb) = (a.sigma_rad_s * a.sigma_rad_s, b.sigma_rad_s * b.sigma_rad_s);
     let (wa, wb) = (vb / (va + vb), va / (va + vb));
-    // Where they are farther apart than their errors say, these are too small by as much (Birge's ratio).
+    // Where they are farther apart than chance puts one pair in six, their errors are too small by as much (Birge's ratio).
     let apart = (a.omega_rad_s - b.omega_rad_s) * (a.omega_rad_s - b.omega_rad_s) / (va + vb);
+    let (ea, eb) = (wa * a.sigma_rad_s, wb * b.sigma_rad_s);
+    let variance = ea * ea + eb * eb + 2.0 * IN_COMMON * ea * eb;
     Estimate {
         omega_rad_s: a.omega_rad_s * wa + b.omega_rad_s * wb,
-        sigma_rad_s: (wa * a.sigma_rad_s + wb * b.sigma_rad_s) * sqrt(apart.max(1.0)),
+        sigma_rad_s: sqrt(variance * (0.5 * apart).max(1.0)),
     }
 }
 
