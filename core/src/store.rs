@@ -1,8 +1,8 @@
 //! The event store: a window of events in a fixed memory.
 //!
-//! Time is cut into segments of equal length; [`WINDOW_SEGMENTS`] of them are the window, and
-//! a few more take in events while the window is measured; when these are full, the oldest of them is given up, so that
-//! what stands behind the window is always the latest, without a gap. A segment
+//! Time is cut into segments of equal length; [`WINDOW_SEGMENTS`] of them are the window, which is held while it is measured, and
+//! a few more take in events meanwhile; when these are full, they become half as many of twice the length, sparser than before,
+//! so that what stands behind the window has no gap. A segment
 //! keeps all its events until it is full; then every second one behind a dense burst of consecutive events goes, and so on as it
 //! fills again. The burst (what a registration of
 //! neighbouring slices needs) stays, and behind it one octave each time: every second, fourth and eighth event, so that
@@ -13,6 +13,8 @@
 mod company;
 mod even;
 mod event;
+mod gyro;
+mod hold;
 mod lengthen;
 mod open;
 mod roll;
@@ -24,6 +26,7 @@ pub use event::StoredEvent;
 pub use roll::Roll;
 pub use window::{Account, Window};
 
+use crate::event::GyroSample;
 use company::Company;
 use open::Segment;
 
@@ -33,6 +36,20 @@ pub const WINDOW_SEGMENTS: usize = 6;
 pub const MOST_SPARE: usize = 4;
 /// Most segments in the ring.
 pub const MOST_SEGMENTS: usize = WINDOW_SEGMENTS + MOST_SPARE;
+
+/// The oldest segments, so many, are being measured; those behind them may be longer.
+#[derive(Clone, Copy, Debug, Default)]
+struct Held {
+    segments: usize,
+    start_us: u64,
+    segment_us: u32,
+}
+
+impl Held {
+    const fn end_us(self) -> u64 {
+        self.start_us + self.segments as u64 * self.segment_us as u64
+    }
+}
 
 /// Events of the recent past, in time order.
 #[derive(Debug)]
@@ -47,14 +64,15 @@ pub struct Store<'m> {
     ring: usize,
     /// Closed segments.
     closed: usize,
-    /// Start of the oldest segment.
+    held: Held,
+    /// Start of the oldest segment behind those that are held, and how long each of them is.
     start_us: u64,
-    /// Segments given up behind those that are measured.
-    given_up: u64,
     segment_us: u32,
     thinned: u64,
     /// What tells the noise in the open segment.
     company: Company,
+    /// A gyro sample of a time behind the open segment.
+    ahead: Option<GyroSample>,
     /// The camera's roll in all segments that went by, and in those given up behind the ones that are measured.
     rolled: Roll,
     rolled_behind: Roll,
@@ -73,11 +91,12 @@ impl<'m> Store<'m> {
             places: core::array::from_fn(|place| place as u8),
             ring,
             closed: 0,
+            held: Held::default(),
             start_us: 0,
-            given_up: 0,
             segment_us: segment_us.max(1),
             thinned: 0,
             company: Company::NONE,
+            ahead: None,
             rolled: Roll::NONE,
             rolled_behind: Roll::NONE,
         }
@@ -88,9 +107,10 @@ impl<'m> Store<'m> {
         let unmeasured = (0..=self.closed).map(|index| self.forget(index)).sum();
         self.segments = [Segment::default(); MOST_SEGMENTS];
         self.closed = 0;
+        self.held = Held::default();
         self.start_us = start_us;
-        self.given_up = 0;
         self.segment_us = segment_us.max(1);
+        self.ahead = None;
         self.rolled_behind = Roll::NONE;
         self.company.clear();
         unmeasured
@@ -106,27 +126,19 @@ impl<'m> Store<'m> {
         u64::from(unmeasured)
     }
 
-    /// The oldest segments, so many, have been measured.
-    pub fn measured(&mut self, segments: usize) {
-        for index in 0..segments.min(self.closed + 1) {
-            let slot = self.slot(index);
-            self.segments[slot].unmeasured = 0;
-        }
-    }
-
     /// Events left out on purpose since the beginning.
     #[must_use]
     pub const fn thinned(&self) -> u64 {
         self.thinned
     }
 
-    /// Length of one segment in microseconds.
+    /// Length of one segment behind those that are held, in microseconds.
     #[must_use]
     pub const fn segment_us(&self) -> u32 {
         self.segment_us
     }
 
-    /// Start of the oldest segment, in microseconds.
+    /// Start of the oldest segment behind those that are held, in microseconds.
     #[must_use]
     pub const fn start_us(&self) -> u64 {
         self.start_us
@@ -135,7 +147,7 @@ impl<'m> Store<'m> {
     /// First instant after the segment that is being filled.
     #[must_use]
     pub const fn open_end_us(&self) -> u64 {
-        self.start_us + (self.closed as u64 + 1 + self.given_up) * self.segment_us as u64
+        self.start_us + (self.closed + 1 - self.held.segments) as u64 * self.segment_us as u64
     }
 
     /// Closed segments.
@@ -144,22 +156,17 @@ impl<'m> Store<'m> {
         self.closed
     }
 
-    /// Segments that fill while a window is measured, the open one among them.
+    /// Segments of the ring that are not held, the open one among them.
     #[must_use]
     pub const fn spare(&self) -> usize {
-        self.ring - WINDOW_SEGMENTS
+        self.ring - self.held.segments
     }
 
-    /// Whether the open segment is the last of the ring, so that closing it needs [`Self::drop_oldest`] or [`Self::give_up`].
+    /// Whether the open segment is the last of the ring, so that closing it needs [`Self::drop_oldest`], [`Self::lengthen`] or
+    /// [`Self::give_up`].
     #[must_use]
     pub const fn full(&self) -> bool {
         self.closed + 1 == self.ring
-    }
-
-    /// Whether segments were given up behind those that are measured, so that what follows does not go on from these.
-    #[must_use]
-    pub const fn is_torn(&self) -> bool {
-        self.given_up > 0
     }
 
     const fn slot(&self, index: usize) -> usize {
@@ -172,21 +179,14 @@ impl<'m> Store<'m> {
         self.segments[slot].lost = self.segments[slot].lost.saturating_add(count);
     }
 
-    /// Takes in the camera's roll rate, positive = the scene turns clockwise on the screen.
-    pub fn roll(&mut self, roll_rad_s: f32) {
-        let slot = self.slot(self.closed);
-        self.segments[slot].roll_sum_rad_s += roll_rad_s;
-        self.segments[slot].roll_count += 1;
-    }
-
     /// What a segment's gyro samples say, if it has any.
     #[inline(never)]
     fn roll_of(&self, index: usize) -> Roll {
-        let Segment { roll_sum_rad_s, roll_count, .. } = self.segments[self.slot(index)];
-        if roll_count == 0 {
+        let Some(mean_rad_s) = self.segments[self.slot(index)].rates.mean_rad_s() else {
             return Roll::NONE;
-        }
-        Roll::at(roll_sum_rad_s / roll_count as f32, self.segment_us)
+        };
+        let held = index < self.held.segments;
+        Roll::at(mean_rad_s, if held { self.held.segment_us } else { self.segment_us })
     }
 
     /// Forgets what the gyro said: it is another one.
@@ -202,42 +202,37 @@ impl<'m> Store<'m> {
         let slot = self.slot(self.closed);
         self.segments[slot] = Segment::after(&before, self.capacity);
         self.company.clear();
+        self.settle();
     }
 
-    /// Moves on from the oldest closed segment.
-    #[inline(never)]
+    /// Moves on from the oldest closed segment. None is held.
     pub fn drop_oldest(&mut self) {
         if self.closed > 0 {
-            self.rolled = self.rolled.and(self.roll_of(0));
-            self.places[..self.ring].rotate_left(1);
-            self.closed -= 1;
+            self.forget_oldest();
             self.start_us += u64::from(self.segment_us);
         }
     }
 
-    /// Gives up the oldest closed segment behind the first `measured` ones, and returns how many events went with it, each counted
-    /// once, whatever it stands for.
-    pub fn give_up(&mut self, measured: usize) -> u64 {
-        if measured >= self.closed {
-            return 0;
-        }
-        let unmeasured = self.forget(measured);
-        self.rolled_behind = self.rolled_behind.and(self.roll_of(measured));
-        self.places[measured..self.ring].rotate_left(1);
+    #[inline(never)]
+    fn forget_oldest(&mut self) {
+        self.rolled = self.rolled.and(self.roll_of(0));
+        self.places[..self.ring].rotate_left(1);
         self.closed -= 1;
-        self.given_up += 1;
-        unmeasured
     }
 
-    /// Moves on from the first `measured` segments to what follows the ones given up behind them.
-    pub fn mend(&mut self, measured: usize) {
-        for _ in 0..measured.min(self.closed) {
-            self.drop_oldest();
+    /// Gives up the oldest closed segment behind those that are held, and returns how many events went with it, each counted
+    /// once, whatever it stands for.
+    pub fn give_up(&mut self) -> u64 {
+        let oldest = self.held.segments;
+        if oldest >= self.closed {
+            return 0;
         }
-        // Only now: what is measured must not know of what came behind it.
-        self.rolled = self.rolled.and(core::mem::take(&mut self.rolled_behind));
-        self.start_us += self.given_up * u64::from(self.segment_us);
-        self.given_up = 0;
+        let unmeasured = self.forget(oldest);
+        self.rolled_behind = self.rolled_behind.and(self.roll_of(oldest));
+        self.places[oldest..self.ring].rotate_left(1);
+        self.closed -= 1;
+        self.start_us += u64::from(self.segment_us);
+        unmeasured
     }
 }
 

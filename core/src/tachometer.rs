@@ -3,7 +3,7 @@
 //! [`Tachometer::push`] takes in events and never waits; [`Tachometer::poll`] advances the measurement of a full
 //! window in bounded steps. A reading is a function of the events of its window, their times and the capacities alone.
 //! Which windows are measured depends on speed only when a measurement takes longer than the spare segments last:
-//! then the oldest of these are given up, their events counted, and the next window begins with those that are left.
+//! then all that came meanwhile is the next window, thinned so that it finds room.
 
 mod conclude;
 mod gate;
@@ -72,6 +72,8 @@ pub struct Tachometer<'m> {
     /// Whether, while a window was measured, nothing came for longer than the spare segments last: what they hold does not go
     /// on from the window, nor what comes from them.
     overrun: bool,
+    /// Whether the window that is measured is all that came while the one before was measured.
+    catching_up: bool,
     /// Whether the last reading was a lock, so that the rest of a stream need not be looked at.
     satisfied: bool,
     ignored: Ignored,
@@ -125,6 +127,7 @@ impl<'m> Tachometer<'m> {
             window_segments: 0,
             window_end_us: 0,
             overrun: false,
+            catching_up: false,
             satisfied: false,
             ignored: Ignored::default(),
             job: Job::Idle,

@@ -40,6 +40,8 @@ pub struct Bench {
     pub trouble: Option<Trouble>,
     pub geometry: Option<Geometry>,
     pub reading: Option<Reading>,
+    /// The screen shows something else than the reading.
+    pub stale: bool,
     pub reason: Reason,
     pub readings: u32,
     pub first_us: u64,
@@ -64,6 +66,7 @@ impl Bench {
             trouble: None,
             geometry: Geometry::new(320, 240),
             reading: None,
+            stale: false,
             reason: Reason::Searching,
             readings: 0,
             first_us: 0,
@@ -108,6 +111,10 @@ impl Device for Bench {
     }
 
     fn reading(&self) -> Option<&Reading> {
+        self.reading.as_ref().filter(|_| !self.stale)
+    }
+
+    fn last_reading(&self) -> Option<&Reading> {
         self.reading.as_ref()
     }
 

@@ -411,6 +411,11 @@ fn the_log_tells_each_reading_once_between_answers() {
     bench.show(reading(&[rotor(0, 3000.0)]));
     let both = drain(link, bench, 0);
     assert!(both.starts_with(b"1;1\n{\"t_s\""), "{}", both.escape_ascii());
+    // Measuring took so long that the sensor is silent by now.
+    bench.stale = true;
+    bench.show(reading(&[rotor(0, 3000.0)]));
+    assert!(drain(link, bench, 0).starts_with(b"{\"t_s\""));
+    bench.stale = false;
     assert_eq!(session.ask("SYST:LOG OFF"), "");
     session.bench.show(reading(&[rotor(0, 3000.0)]));
     assert_eq!(session.ask(""), "");

@@ -5,17 +5,22 @@ use super::open::{as_they_came, level};
 use super::{MOST_SEGMENTS, Segment, Store};
 
 impl Store<'_> {
-    /// Makes segments longer, keeping what is stored: each new segment keeps the burst and the octaves of the first old one in
+    /// Makes the segments behind those that are held longer, keeping what is stored: each new segment keeps the burst and the octaves of the first old one in
     /// it, and of the rest every event that stands for as many as the new reservoir's stride says.
     /// `segment_us` is at least the length so far. Cost: two passes over the store.
     pub fn lengthen(&mut self, segment_us: u32) {
         let old: [Segment; MOST_SEGMENTS] = core::array::from_fn(|i| self.segments[self.slot(i)]);
         let old_us = u64::from(self.segment_us);
-        let closed = (self.closed as u64 * old_us / u64::from(segment_us)) as usize;
+        let held = self.held.segments;
+        if held > self.closed {
+            return;
+        }
+        let closed = held + ((self.closed - held) as u64 * old_us / u64::from(segment_us)) as usize;
         // Reading runs ahead of writing: new segments start no earlier than old ones and hold no more events.
-        let (mut from, mut index) = (0, 0);
-        for new in 0..=closed {
-            let end_us = ((new as u64 + 1) * u64::from(segment_us)).min(i32::MAX as u64) as i32;
+        let (mut from, mut index) = (held, 0);
+        for new in held..=closed {
+            let nth = (new - held) as u64;
+            let end_us = ((nth + 1) * u64::from(segment_us)).min(i32::MAX as u64) as i32;
             let mut merged = self.plan_merge(&old, (from, index), end_us);
             let burst = as_they_came(self.capacity, merged.stride_log2);
             let first = from;
@@ -59,12 +64,11 @@ impl Store<'_> {
                 merged.counted += if segment.len == 0 { segment.counted } else { 0 };
                 (from, index) = (from + 1, 0);
             }
-            for (i, segment) in old.iter().enumerate().take(self.closed + 1) {
-                if (i as u64 * old_us) / u64::from(segment_us) == new as u64 {
+            for (i, segment) in old.iter().enumerate().take(self.closed + 1).skip(held) {
+                if ((i - held) as u64 * old_us) / u64::from(segment_us) == nth {
                     merged.lost = merged.lost.saturating_add(segment.lost);
                     merged.unmeasured = merged.unmeasured.saturating_add(segment.unmeasured);
-                    merged.roll_sum_rad_s += segment.roll_sum_rad_s;
-                    merged.roll_count += segment.roll_count;
+                    merged.rates = merged.rates.and(segment.rates);
                 }
             }
             let slot = self.slot(new);

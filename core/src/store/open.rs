@@ -3,6 +3,7 @@
 use core::cell::Cell;
 
 use super::event::MOST_WEIGHT_LOG2;
+use super::gyro::Rates;
 use super::{Store, StoredEvent};
 use crate::event::PackedEvent;
 
@@ -24,8 +25,8 @@ pub(super) struct Segment {
     pub unmeasured: u32,
     /// Events that were lost before.
     pub lost: u64,
-    pub roll_sum_rad_s: f32,
-    pub roll_count: u32,
+    /// What the camera's gyro said.
+    pub rates: Rates,
     /// Every 2^stride_log2-th event is kept, behind the burst and its octaves.
     pub stride_log2: u8,
     /// Events to pass over before the next is kept.

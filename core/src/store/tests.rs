@@ -71,74 +71,103 @@ fn even_events_stand_for_the_same_number_each() {
     assert!(first_half.abs_diff(kept.len() - first_half) <= 2);
 }
 
-#[test]
-fn what_is_given_up_is_counted_and_the_next_window_begins_with_the_latest() {
-    let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
-    let mut store = Store::new(&mut memory, MOST_SPARE, 1_000);
-    let mut given_up = 0;
-    for t_us in 0..12_500 {
+/// Fills a store of which the window is measured; when the ring is full, `make_room` does something about it.
+fn fill_behind(
+    store: &mut Store<'_>,
+    times: core::ops::Range<u64>,
+    weight_log2: u8,
+    mut make_room: impl FnMut(&mut Store<'_>),
+) {
+    for t_us in times {
         while t_us >= store.open_end_us() {
             if store.full() {
-                given_up += store.give_up(WINDOW_SEGMENTS);
+                make_room(store);
+            } else {
+                store.close_segment();
             }
-            store.close_segment();
+            if store.held.segments == 0 && store.closed() == WINDOW_SEGMENTS {
+                store.hold(WINDOW_SEGMENTS);
+            }
         }
-        store.push(&[PackedEvent::pack(&event(t_us))], 0, |_, _| {});
+        store.push(&[PackedEvent::pack(&event(t_us))], weight_log2, |_, _| {});
     }
-    // Six are measured, 6 000 to 9 000 went, and four stand: 9 000 to 12 500.
-    assert_eq!(given_up, 3_000);
-    assert!(store.is_torn());
-    let measured = store.window(WINDOW_SEGMENTS, u64::MAX);
-    assert_eq!((measured.start_us, measured.duration_us), (0, 6_000));
-    assert!(measured.events().all(|event| (0..6_000).contains(&event.since(0))));
-    let kept = store.account(MOST_SEGMENTS).kept;
-    assert_eq!(12_500, kept + store.thinned() + given_up);
+}
 
-    store.mend(WINDOW_SEGMENTS);
-    assert!(!store.is_torn());
-    assert_eq!((store.closed(), store.open_end_us()), (3, 13_000));
-    let next = store.window(MOST_SEGMENTS, u64::MAX);
-    assert_eq!((next.start_us, next.duration_us), (9_000, 4_000));
-    let times: Vec<i32> = next.events().map(|event| event.since(9_000)).collect();
-    assert!(times.first() == Some(&0) && times.iter().all(|t_us| (0..3_500).contains(t_us)));
-    assert!(times.windows(2).all(|pair| pair[0] < pair[1]));
+#[test]
+fn what_comes_while_a_window_is_measured_is_thinned_and_has_no_gap() {
+    for until_us in [10_300, 12_500, 13_999, 22_100, 31_000] {
+        let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
+        let mut store = Store::new(&mut memory, MOST_SPARE, 1_000);
+        fill_behind(&mut store, 0..until_us, 0, |store| store.lengthen(2 * store.segment_us()));
+        let measured = store.window(WINDOW_SEGMENTS, u64::MAX);
+        assert_eq!((measured.start_us, measured.duration_us), (0, 6_000));
+        assert!(measured.events().all(|event| (0..6_000).contains(&event.since(0))));
+        assert_eq!(store.stored_us(until_us - 1), until_us - 1 - 6_000);
+
+        assert!(!store.release(), "longer segments do not go on from shorter ones");
+        let segments = store.hold_all(until_us - 1, 1_000);
+        assert!((2..=5).contains(&segments), "{segments}");
+        let window = store.window(segments, until_us);
+        assert_eq!((window.start_us, u64::from(window.duration_us)), (6_000, until_us - 6_000));
+        // Each that is kept stands for those up to the next, as well as that can be where bursts were.
+        let account = store.account(segments);
+        assert_eq!(account.counted, until_us - 6_000);
+        let kept: Vec<_> = window.events().map(|e| (e.since(0), e.weight_log2())).collect();
+        assert_eq!(kept.first().map(|(t_us, _)| *t_us), Some(6_000));
+        let last_us = until_us as i32;
+        let next = kept.iter().skip(1).map(|(t_us, _)| *t_us).chain([last_us]);
+        for ((t_us, weight_log2), next_us) in kept.iter().zip(next) {
+            assert!((1..=512).contains(&(next_us - t_us)), "{t_us} to {next_us}: {weight_log2}");
+        }
+        let stands_for: u64 = kept.iter().map(|(_, weight_log2)| 1 << weight_log2).sum();
+        assert!(stands_for.abs_diff(account.counted) < account.counted / 4, "{stands_for}");
+
+        // It goes on as if nothing had been.
+        assert_eq!((store.start_us(), store.segment_us()), (until_us - 1, 1_000));
+        fill(&mut store, until_us..until_us + 2_500);
+        assert!(!store.release());
+        let next = store.window(MOST_SEGMENTS, u64::MAX);
+        assert_eq!((next.start_us, next.duration_us), (until_us - 1, 3_000));
+        assert_eq!(store.account(3).counted, 2_500);
+        assert!(next.segment(0).len() > 40, "{} in the first", next.segment(0).len());
+        let all = store.account(MOST_SEGMENTS);
+        assert_eq!(store.restart(0, 1_000), all.counted, "only these were not measured");
+    }
+}
+
+#[test]
+fn a_window_that_was_measured_in_time_is_gone_on_from() {
+    let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
+    let mut store = Store::new(&mut memory, MOST_SPARE, 1_000);
+    fill_behind(&mut store, 0..9_900, 0, |_| unreachable!("there is room"));
+    assert!(store.release());
+    assert_eq!((store.start_us(), store.open_end_us(), store.closed()), (0, 10_000, 9));
+    store.drop_oldest();
+    assert_eq!((store.start_us(), store.open_end_us(), store.closed()), (1_000, 10_000, 8));
 }
 
 #[test]
 fn what_no_window_measured_is_counted_once_whatever_it_stands_for() {
     let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
     let mut store = Store::new(&mut memory, MOST_SPARE, 1_000);
-    let (mut handed_in, mut unmeasured) = (0, 0);
-    let mut fill_until = |store: &mut Store<'_>, until_us: u64| {
-        let mut given_up = 0;
-        for t_us in handed_in..until_us {
-            while t_us >= store.open_end_us() {
-                if store.full() {
-                    given_up += store.give_up(WINDOW_SEGMENTS);
-                }
-                store.close_segment();
-            }
-            // Seven of eight were left out before.
-            store.push(&[PackedEvent::pack(&event(t_us))], 3, |_, _| {});
-        }
-        handed_in = until_us;
-        given_up
-    };
-    unmeasured += fill_until(&mut store, 12_500);
-    assert_eq!(unmeasured, 3_000);
-    store.measured(WINDOW_SEGMENTS);
-    store.mend(WINDOW_SEGMENTS);
+    // Seven of eight were left out before.
+    let mut given_up = 0;
+    fill_behind(&mut store, 0..12_500, 3, |store| given_up += store.give_up());
+    assert_eq!(given_up, 3_000);
+    let kept = store.account(MOST_SEGMENTS).kept;
+    assert_eq!(8 * (12_500 - 3_000), kept + store.thinned());
+    assert!(!store.release());
+    assert_eq!((store.start_us(), store.closed(), store.open_end_us()), (9_000, 3, 13_000));
     // Four of the next six segments, and the two behind them, are measured once more, and count once.
-    unmeasured += fill_until(&mut store, 16_500);
-    store.measured(WINDOW_SEGMENTS);
+    let mut never = |_: &mut Store<'_>| unreachable!("there is room");
+    fill_behind(&mut store, 12_500..16_500, 3, &mut never);
+    assert!(store.release());
     store.drop_oldest();
     store.drop_oldest();
-    unmeasured += fill_until(&mut store, 17_200);
+    fill(&mut store, 16_500..17_200);
     store.lengthen(2_000);
-    assert_eq!(unmeasured, 3_000);
     // The stream breaks off: from 15 000 on nothing was measured.
-    unmeasured += store.restart(99_000_000, 1_000);
-    assert_eq!(unmeasured, 3_000 + 2_200);
+    assert_eq!(store.restart(99_000_000, 1_000), 2_200);
     assert_eq!(store.restart(99_000_000, 1_000), 0);
 }
 

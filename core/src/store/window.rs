@@ -1,10 +1,11 @@
 //! What the store hands out: the events of a stretch of time, and where they went.
 
-use super::{MOST_SEGMENTS, Roll, Store, StoredEvent};
+use super::gyro::Rates;
+use super::{Held, MOST_SEGMENTS, Roll, Store, StoredEvent};
 
 impl Store<'_> {
-    /// The window over the oldest `segments` segments (the open one counts as the last when all closed
-    /// ones are taken), no longer than to `end_us`.
+    /// The window over the oldest `segments` segments, or over as many of those that are held (the open one counts as the last when
+    /// all closed ones are taken), no longer than to `end_us`.
     #[must_use]
     #[inline(never)]
     pub fn window(&self, segments: usize, end_us: u64) -> Window<'_> {
@@ -15,13 +16,15 @@ impl Store<'_> {
             let base = slot * self.capacity;
             *part = &self.events[base..base + self.segments[slot].len];
         }
-        Window {
-            parts,
-            start_us: self.start_us,
-            duration_us: (self.segment_us * segments as u32)
-                .min(end_us.saturating_sub(self.start_us).min(u64::from(u32::MAX)) as u32),
-            segments,
-        }
+        let Held { segments: held, .. } = self.held;
+        let (start_us, segment_us) = if held > 0 {
+            (self.held.start_us, self.held.segment_us)
+        } else {
+            (self.start_us, self.segment_us)
+        };
+        let duration_us = (segment_us * segments as u32)
+            .min(end_us.saturating_sub(start_us).min(u64::from(u32::MAX)) as u32);
+        Window { parts, start_us, duration_us, segments }
     }
 
     /// Events counted, kept and lost in the oldest `segments` segments.
@@ -33,8 +36,7 @@ impl Store<'_> {
             account.counted += segment.counted;
             account.kept += segment.len as u64;
             account.lost = account.lost.saturating_add(segment.lost);
-            account.roll_sum_rad_s += segment.roll_sum_rad_s;
-            account.roll_count += segment.roll_count;
+            account.rates = account.rates.and(segment.rates);
             account.rolled = account.rolled.and(self.roll_of(index));
         }
         account
@@ -50,10 +52,7 @@ pub struct Account {
     pub kept: u64,
     /// Reported lost by the sensor or the link.
     pub lost: u64,
-    /// Sum of the camera's roll rates.
-    roll_sum_rad_s: f32,
-    /// Number of roll rates.
-    roll_count: u32,
+    rates: Rates,
     /// The camera's roll up to the end of the window, as far as it was heard.
     pub rolled: Roll,
 }
@@ -62,7 +61,7 @@ impl Account {
     /// Mean roll rate of the camera in rad/s, where a gyro was heard.
     #[must_use]
     pub fn roll_rad_s(&self) -> Option<f32> {
-        (self.roll_count > 0).then(|| self.roll_sum_rad_s / self.roll_count as f32)
+        self.rates.mean_rad_s()
     }
 }
 

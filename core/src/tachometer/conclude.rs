@@ -30,11 +30,16 @@ const LEAST_EVENTS: u64 = 300;
 const MOST_LOST: f32 = 0.5;
 
 impl Tachometer<'_> {
-    /// Turns the outcomes into a reading and moves the window on.
-    pub(super) fn conclude(&mut self) -> Reading {
+    /// Turns the outcomes into a reading and moves the window on. None comes of a window in which it was only caught up with what came
+    /// while another was measured, and what is followed was not to be seen: that is sparser, and the next one tells.
+    pub(super) fn conclude(&mut self) -> Option<Reading> {
+        if core::mem::take(&mut self.lost) {
+            self.outcomes.clear();
+            self.move_on(None);
+            return None;
+        }
         let segments = self.window_segments;
         let account = self.store.account(segments);
-        self.store.measured(segments);
         let window = self.store.window(segments, self.window_end_us);
         let (start_us, window_us) = (window.start_us, window.duration_us);
         self.tracker.start_reading();
@@ -57,8 +62,8 @@ impl Tachometer<'_> {
         } else {
             best_status(&rotors, self.in_step_hz)
         };
-        self.move_on(status);
-        Reading {
+        self.move_on(Some(status));
+        Some(Reading {
             t_us: start_us + u64::from(window_us / 2),
             window_us,
             events: account.counted,
@@ -66,14 +71,19 @@ impl Tachometer<'_> {
             lost: account.lost,
             status,
             rotors,
-        }
+        })
     }
 
     /// Chooses the next window: longer while a rotor or the search needs it, else a hop further.
-    fn move_on(&mut self, status: Status) {
-        let measured = core::mem::take(&mut self.window_segments);
+    fn move_on(&mut self, status: Option<Status>) {
+        self.window_segments = 0;
         self.job = Job::Idle;
-        self.satisfied = status == Status::Locked;
+        let caught_up = core::mem::take(&mut self.catching_up);
+        let goes_on = self.store.release();
+        if !goes_on {
+            self.fade(WINDOW_SEGMENTS);
+        }
+        self.satisfied = status == Some(Status::Locked);
         if self.outcomes.iter().any(|outcome| outcome.status != Status::Locked) {
             self.until_search = self.until_search.min(SEARCH_AGAIN);
         }
@@ -82,31 +92,36 @@ impl Tachometer<'_> {
             self.begin_anew(self.last_us);
             return;
         }
-        let torn = self.store.is_torn();
-        if torn {
-            self.store.mend(measured);
-            self.fade(measured);
+        if caught_up && !self.satisfied && self.is_behind() {
+            // Else a rotor that does not lock in long windows would never be seen in a short one again.
+            let segment_us = segment_us(self.target_us);
+            self.ignored.overrun += self.store.restart(self.last_us, segment_us);
+            return;
         }
-        let window_us = self.store.segment_us() * WINDOW_SEGMENTS as u32;
-        let wanted = self.outcomes.iter().map(|o| o.wanted_us).fold(0.0, f32::max);
-        let wanted =
-            if status.reason().is_some() { wanted.max(1.5 * window_us as f32) } else { wanted };
+        let window_us = segment_us(self.target_us) * WINDOW_SEGMENTS as u32;
+        let mut wanted = self.outcomes.iter().map(|o| o.wanted_us).fold(0.0, f32::max);
+        let refused = status.and_then(Status::reason).is_some();
+        if refused && !caught_up {
+            wanted = wanted.max(1.5 * window_us as f32);
+        }
         let adapts = self.settings.window_us.is_none();
-        // Six whole segments may fall short of the longest window by some microseconds.
-        let longest = self.store.segment_us() >= segment_us(LONGEST_WINDOW_US);
-        let too_long = adapts && !torn && self.is_too_long(status, longest);
+        let longest = segment_us(self.target_us) >= segment_us(LONGEST_WINDOW_US);
+        let too_long =
+            adapts && goes_on && status.is_some_and(|status| self.is_too_long(status, longest));
         if too_long {
             // As late as measuring it may end without anything given up, so that nothing depends on when it did.
-            let last = (WINDOW_SEGMENTS + self.store.spare()) as u64;
+            let last = self.store.spare() as u64;
             let end_us = self.store.start_us() + last * u64::from(self.store.segment_us());
             self.anew_us = Some(end_us);
         } else if adapts && wanted > window_us as f32 * 1.02 && !longest {
             let longer = WINDOWS_US.iter().find(|w| **w as f32 >= wanted);
             self.target_us = longer.copied().unwrap_or(LONGEST_WINDOW_US);
-            self.store.lengthen(segment_us(self.target_us));
+            if self.store.segment_us() < segment_us(self.target_us) {
+                self.store.lengthen(segment_us(self.target_us));
+            }
             // It is longer for a rotor that is not locked, and only those are followed.
             self.until_search = 0;
-        } else if !torn {
+        } else if goes_on {
             let hop = self.rhythm.hop(self.store.segment_us());
             for _ in 0..hop {
                 self.store.drop_oldest();

@@ -13,6 +13,8 @@ const CLOCK_RESET_US: u64 = 1_000_000;
 const LATEST_US: u64 = u64::MAX / 2;
 /// Events that are packed before they are taken in.
 const PACKED_AT_ONCE: usize = 128;
+/// Longest that what comes while a window is measured may last and be measured as one window, in microseconds.
+const LONGEST_BEHIND_US: u32 = 2 * LONGEST_WINDOW_US;
 /// Fastest roll that is believed, in rad/s: gyros in cameras end at 2000 degrees a second (35 rad/s).
 const FASTEST_ROLL_RAD_S: f32 = 100.0;
 
@@ -144,6 +146,7 @@ impl Tachometer<'_> {
     pub(super) fn restart(&mut self, t_us: u64) {
         self.started = true;
         self.overrun = false;
+        self.catching_up = false;
         self.anew_us = None;
         self.window_segments = 0;
         self.job = Job::Idle;
@@ -165,7 +168,7 @@ impl Tachometer<'_> {
     fn advance(&mut self, t_us: u64) {
         let gap_us = t_us - self.store.open_end_us();
         let spare_us = self.store.spare() as u64 * u64::from(self.store.segment_us());
-        let goes_on = self.window_segments > 0 && gap_us < spare_us;
+        let goes_on = self.window_segments == 0 || gap_us < spare_us;
         if gap_us > u64::from(LONGEST_WINDOW_US) && self.window_segments == 0 {
             // Nothing for longer than any window: what went before says nothing about what comes.
             self.restart(t_us);
@@ -181,7 +184,12 @@ impl Tachometer<'_> {
                     self.overrun = true;
                     return;
                 }
-                self.ignored.overrun += self.store.give_up(self.window_segments);
+                let twice_us = self.store.segment_us().saturating_mul(2);
+                if twice_us.saturating_mul(self.store.spare() as u32) <= LONGEST_BEHIND_US {
+                    self.store.lengthen(twice_us);
+                    continue;
+                }
+                self.ignored.overrun += self.store.give_up();
                 self.heat.fade(1, WINDOW_SEGMENTS as u16);
             }
             self.store.close_segment();
@@ -189,15 +197,34 @@ impl Tachometer<'_> {
         }
     }
 
+    /// Whether segments are longer than those of the window should be, because a measurement took longer than these last.
+    pub(super) fn is_behind(&self) -> bool {
+        self.store.segment_us() > segment_us(self.target_us)
+    }
+
     /// Begins to measure the window once it is full, or makes it longer first.
     #[inline(never)]
     pub(super) fn begin(&mut self) {
         let waits = self.anew_us.is_some();
-        while !waits && self.window_segments == 0 && self.store.closed() >= WINDOW_SEGMENTS {
+        if waits || self.window_segments > 0 {
+            return;
+        }
+        if self.is_behind() {
+            if self.store.stored_us(self.last_us) >= u64::from(self.target_us) {
+                let segments = self.store.hold_all(self.last_us, segment_us(self.target_us));
+                self.catching_up = segments > 0;
+                if self.catching_up {
+                    self.start(segments);
+                }
+            }
+            return;
+        }
+        while self.window_segments == 0 && self.store.closed() >= WINDOW_SEGMENTS {
             let window_us = self.store.segment_us() * WINDOW_SEGMENTS as u32;
             if window_us + WINDOW_SEGMENTS as u32 <= self.target_us {
                 self.store.lengthen(segment_us(self.target_us.min(2 * window_us)));
             } else {
+                self.store.hold(WINDOW_SEGMENTS);
                 self.start(WINDOW_SEGMENTS);
             }
         }
@@ -208,18 +235,20 @@ impl Tachometer<'_> {
         self.store.lost(count);
     }
 
-    /// Takes in a gyro sample. One that no gyro gives (not a number, or faster than any measures) is left out.
+    /// Takes in a gyro sample, before or behind the events of its time, but before a window with these has been measured. One that no gyro gives (not a number, or faster than any measures) is left out.
     pub fn gyro(&mut self, sample: GyroSample) {
         let believed = sample.roll_rad_s.abs() <= FASTEST_ROLL_RAD_S;
         if self.started && believed {
-            self.store.roll(sample.roll_rad_s);
+            self.store.roll(sample);
         }
     }
 
     /// Ends the stream: what is in the window is to be measured even if the window is not full.
     pub fn finish(&mut self) {
         if self.started && self.window_segments == 0 && !self.satisfied {
-            self.start((self.store.closed() + 1).min(WINDOW_SEGMENTS));
+            let segments = (self.store.closed() + 1).min(WINDOW_SEGMENTS);
+            self.store.hold(segments);
+            self.start(segments);
         }
     }
 }

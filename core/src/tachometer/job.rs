@@ -26,12 +26,18 @@ impl Tachometer<'_> {
             let followed = Some((known.parts, known.alike));
             self.candidates.push(Suspect { found: known.found, followed }).ok();
         }
-        if self.until_search == 0 || self.candidates.is_empty() {
+        let only_follows = self.catching_up && !self.candidates.is_empty();
+        if self.until_search == 0 && !only_follows || self.candidates.is_empty() {
             self.search_anew();
             return;
         }
         for found in self.tracker.known().iter().filter_map(Known::told) {
             suspect(&mut self.candidates, found);
+        }
+        if only_follows {
+            // What is searched for takes so long that there would be as much to catch up with again.
+            self.measure_next(0);
+            return;
         }
         if self.until_search != NEVER {
             self.until_search -= 1;
@@ -70,8 +76,10 @@ impl Tachometer<'_> {
             if self.window_segments == 0 {
                 return Poll::Idle;
             }
-            if self.step() {
-                return Poll::Ready(self.conclude());
+            if self.step()
+                && let Some(reading) = self.conclude()
+            {
+                return Poll::Ready(reading);
             }
         }
         Poll::Pending
@@ -155,8 +163,9 @@ impl Tachometer<'_> {
         };
         let next = (index..self.candidates.len()).find(|i| !taken(&self.candidates[*i].found.disc));
         let Some(next) = next else {
-            if core::mem::take(&mut self.lost) {
+            if self.lost && !self.catching_up {
                 // What was lost is looked for in this very window, outside of what was not.
+                self.lost = false;
                 self.search_anew();
             } else {
                 self.job = Job::Idle;

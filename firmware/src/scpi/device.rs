@@ -45,7 +45,7 @@ pub struct Fate {
     pub used: u64,
     /// Left out evenly before, because more waited to be measured, or by the camera, because it was told to.
     pub thinned: u64,
-    /// Handed to the measurement, and in no window that was measured: one took too long, or the stream broke off.
+    /// Handed to the measurement, and in no window that was measured: the stream or the settings broke off, or one took far too long.
     pub late: u64,
     /// Lost by the sensor or the link.
     pub lost_before: u64,
@@ -112,6 +112,9 @@ pub trait Device {
     /// The reading that the screen shows, held or live, its speeds corrected by the clock's trim; `None` while it
     /// shows none.
     fn reading(&self) -> Option<&Reading>;
+
+    /// The last reading, whether the screen shows it or, by now, something else.
+    fn last_reading(&self) -> Option<&Reading>;
 
     /// Why the screen shows no reading.
     fn reason(&self) -> Reason;

@@ -279,7 +279,7 @@ impl Link {
             return;
         }
         self.logged = readings;
-        if let Some(reading) = device.reading() {
+        if let Some(reading) = device.last_reading() {
             let line = LogLine { reading, first_us: device.first_us() };
             writeln!(self.response, "{line}").ok();
             if self.response.overflowed() {

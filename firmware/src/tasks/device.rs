@@ -37,6 +37,10 @@ impl<R: Recording, P: Panel> Device for Front<R, P> {
         shown.then_some(reading)
     }
 
+    fn last_reading(&self) -> Option<&Reading> {
+        self.instrument.reading()
+    }
+
     fn reason(&self) -> Reason {
         self.instrument.state().reason().unwrap_or(Reason::Searching)
     }

@@ -91,15 +91,11 @@ pub fn feed(
 ) {
     let stretches = events.chunk_by(|a, b| a.t_us / PIECE_US == b.t_us / PIECE_US);
     for piece in stretches.flat_map(|stretch| stretch.chunks(PIECE_EVENTS)) {
-        let Some(first) = piece.first() else { continue };
-        while let Some((sample, rest)) = samples.split_first() {
-            if sample.t_us > first.t_us {
-                break;
-            }
-            tachometer.gyro(*sample);
-            *samples = rest;
-        }
+        let Some(last) = piece.last() else { continue };
         tachometer.push(piece);
+        let reached = samples.partition_point(|sample| sample.t_us <= last.t_us);
+        samples[..reached].iter().for_each(|sample| tachometer.gyro(*sample));
+        *samples = &samples[reached..];
         drain(tachometer, &mut reading);
     }
 }

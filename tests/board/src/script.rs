@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `run S`, `run_until S` | lets so many seconds pass, or until this time since power came |
 //! | `plug davis346 FILE.ev8`, `plug dvxplorer FILE.ev8`, `plug stick` | plugs something into the host port |
-//! | `firmware N`, `roll RAD_S`, `repeat S` | of the next camera: the version of its firmware; what its gyro measures; what it sees comes again after so many seconds |
+//! | `firmware N`, `roll RAD_S`, `swing RAD_S`, `repeat S` | of the next camera: the version of its firmware; what its gyro measures, and how far that swings to and fro; what it sees comes again after so many seconds |
 //! | `cover` | a cap on the lens of the camera: nothing happens any more |
 //! | `unplug`, `unplug quiet`, `unplug errors` | with all signs; without errors; without a word from the port |
 //! | `camera` | what the camera has seen, left out and dropped, as JSON |
@@ -55,6 +55,7 @@ pub struct Script {
     camera: Option<Rc<RefCell<Camera>>>,
     firmware: Option<u8>,
     roll_rad_s: f32,
+    swing_rad_s: f32,
     repeat_us: Option<u64>,
 }
 
@@ -107,7 +108,14 @@ fn events(path: &str) -> Result<Vec<Event>> {
 impl Script {
     /// Someone at a device.
     pub fn new(machine: Machine) -> Self {
-        Self { machine, camera: None, firmware: None, roll_rad_s: 0.0, repeat_us: None }
+        Self {
+            machine,
+            camera: None,
+            firmware: None,
+            roll_rad_s: 0.0,
+            swing_rad_s: 0.0,
+            repeat_us: None,
+        }
     }
 
     /// Carries out a line and says what comes of it.
@@ -128,6 +136,7 @@ impl Script {
                     camera.borrow_mut().roll_rad_s = self.roll_rad_s;
                 }
             }
+            "swing" => self.swing_rad_s = number(rest)?,
             "repeat" => self.repeat_us = Some(ps(rest)? / crate::time::US),
             "cover" => {
                 let camera = self.camera.as_ref().ok_or_else(|| anyhow!("there is no camera"))?;
@@ -229,6 +238,7 @@ impl Script {
             camera.repeat(period_us);
         }
         camera.roll_rad_s = self.roll_rad_s;
+        camera.swing_rad_s = self.swing_rad_s;
         if let Some(firmware) = self.firmware {
             camera.firmware = firmware;
         }

@@ -1,7 +1,7 @@
 //! What a camera at the port sees, read by the device: the PC's readings to the bit, and the PC's screen to the pixel.
 
 use evtach_core::decode::{Dvxplorer, Mounting};
-use evtach_core::{Event, Reading, Settings};
+use evtach_core::{Event, Geometry, Reading, Settings};
 use evtach_firmware::instrument::{Instrument, Picture, Preferences, Sensor, Traffic};
 use evtach_firmware::sensor::usb::emulated::DvxplorerWords;
 use evtach_host::measure::{Capacity, ReadingRow, drain, measure_events, with_tachometer};
@@ -281,28 +281,45 @@ fn one_rotor_before_a_dvxplorer() {
     );
 }
 
-/// The real spinning dot, its middle moved to where the camera's pixels are, and what lies beside these left out.
-#[test]
-fn the_real_spinning_dot() {
-    let pixels = DAVIS346;
-    let Some(folder) = recordings("real") else { return };
-    let dot = load(&folder.join("spinning-dot.evt2.raw")).expect("a recording");
-    let half = |wide: u16, narrow: u16| (i32::from(wide) - i32::from(narrow)) / 2;
-    let (left, top) = (
-        half(dot.geometry.width_px, pixels.width_px),
-        half(dot.geometry.height_px, pixels.height_px),
-    );
+/// Times as slow as the real dot is played: it lasts 50 ms, nine million events a second, more than a port carries.
+const SLOWER: u64 = 20;
+
+/// Most events a second that are all used.
+const ALL_USED_EV_S: u64 = 150_000;
+
+/// Where the middle of the real dot's ring is, in pixels.
+const RING: (i32, i32) = (314, 202);
+
+/// The real spinning dot in slow motion, its ring moved to the middle of the camera's pixels, and what lies beside these left out.
+fn the_real_dot(pixels: Geometry) -> Option<Loaded> {
+    let dot = load(&recordings("real")?.join("spinning-dot.evt2.raw")).expect("a recording");
+    let (left, top) =
+        (RING.0 - i32::from(pixels.width_px / 2), RING.1 - i32::from(pixels.height_px / 2));
     let events = dot.events.iter().filter_map(|event| {
         let x = u16::try_from(i32::from(event.x) - left).ok()?;
         let y = u16::try_from(i32::from(event.y) - top).ok()?;
-        pixels.contains(x, y).then_some(Event { x, y, ..*event })
+        pixels.contains(x, y).then_some(Event { x, y, t_us: SLOWER * event.t_us, ..*event })
     });
     let events = from_zero(events.collect());
-    // Nine million events a second, more than the port carries: every so many, as the camera's own skipping would have it.
-    let per_s =
-        events.len() as u64 * 1_000_000 / events.last().map_or(1, |event| event.t_us.max(1));
-    let every = usize::try_from(per_s.div_ceil(300_000)).unwrap_or(usize::MAX);
-    let sees = Loaded { geometry: pixels, events: events.into_iter().step_by(every).collect() };
-    // It lasts 50 ms, less than a turn, of which so few events are left that the PC may refuse it; then so does the device.
-    assert_reads_and_shows_as_the_pc(Camera::Davis346, sees, Some(40), None);
+    // Every so many, as the camera's own skipping would have it.
+    let lasts_us = events.last().map_or(1, |event| event.t_us.max(1));
+    let per_s = events.len() as u64 * 1_000_000 / lasts_us;
+    let every = usize::try_from(per_s.div_ceil(ALL_USED_EV_S)).unwrap_or(usize::MAX);
+    Some(Loaded { geometry: pixels, events: events.into_iter().step_by(every).collect() })
+}
+
+/// Most of its turn, in milliseconds. That so few of its events are left, and less than a turn, the PC refuses; then so does the
+/// device, and both show the silence that follows.
+const DOT: Option<u32> = Some(960);
+
+#[test]
+fn the_real_spinning_dot() {
+    let Some(sees) = the_real_dot(DAVIS346) else { return };
+    assert_reads_and_shows_as_the_pc(Camera::Davis346, sees, DOT, None);
+}
+
+#[test]
+fn the_real_spinning_dot_before_a_dvxplorer() {
+    let Some(sees) = the_real_dot(DVXPLORER) else { return };
+    assert_reads_and_shows_as_the_pc(Camera::Dvxplorer, sees, DOT, None);
 }

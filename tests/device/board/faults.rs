@@ -128,7 +128,7 @@ fn far_more_events_than_the_port_carries() {
     assert!((rpm / RPM - 1.0).abs() < 0.01, "{read}");
     assert!(board.query("*IDN?").starts_with("EV-Tach"));
     board.cover();
-    // Twice a second the camera is asked what it dropped, as long as it has something to say.
+    // Ten times a second the camera is asked what it dropped, as long as it has something to say.
     board.run(1.2);
     // The camera's own filters leave out most of what the device could not use, its FIFO drops the rest, and both count.
     let camera = board.camera();
@@ -139,12 +139,14 @@ fn far_more_events_than_the_port_carries() {
     let fates: Vec<u64> = fate.split(',').filter_map(|count| count.parse().ok()).collect();
     let [used, thinned, late, lost_before, overrun] = fates[..] else { unreachable!("{fate}") };
     evtach_tests::show(&format!("a flood: {read}; {fate}; {camera}"));
-    // What the camera skips by order it does not count: as many as come, give or take the transfers under way when it is told
-    // to. Nor what is outside of the region, and nobody else does.
+    // What the camera skips by order it does not count: one for each that comes. When it is told to, 8192 events stand in its FIFO
+    // and three transfers of 512 are under way, which are taken for some that were let through. Nor what is outside of the region,
+    // and nobody else does.
+    const UNDER_WAY: u64 = 8_192 + 3 * 512;
     let outside = counted("filtered") - counted("skipped");
     let told = used + thinned + late + lost_before + overrun;
     let all = counted("seen") - outside;
-    assert!(told.abs_diff(all) < all / 50, "{told} of {all}, {fate}; {camera}");
+    assert!(told.abs_diff(all) < UNDER_WAY, "{told} of {all}, {fate}; {camera}");
     assert!(used > 100_000, "{fate}; {camera}");
     assert_eq!(lost_before, counted("dropped"), "{fate}; {camera}");
     board.assert_sound();

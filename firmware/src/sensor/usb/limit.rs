@@ -151,12 +151,15 @@ impl Governor {
         self.steps.get(self.step).copied().unwrap_or_default()
     }
 
-    /// Takes in how many events came so far, or were lost for want of room; the new limit, when it is another.
+    /// Whether the rate is to be looked at again: ten times a second.
+    pub fn is_due(&self, now: Instant) -> bool {
+        now.saturating_duration_since(self.since) >= WINDOW
+    }
+
+    /// Takes in how many events came so far, or were lost for want of room; the new limit, when it is another. To be called when it
+    /// is due.
     pub fn update(&mut self, now: Instant, events: u64) -> Option<Limit> {
-        let took_us = now.saturating_duration_since(self.since).as_micros();
-        if took_us < WINDOW.as_micros() {
-            return None;
-        }
+        let took_us = now.saturating_duration_since(self.since).as_micros().max(1);
         let rate_ev_s = events.saturating_sub(self.from).saturating_mul(1_000_000) / took_us;
         (self.since, self.from) = (now, events);
         let most_ev_s = u64::from(self.most_ev_s);

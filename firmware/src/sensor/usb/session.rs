@@ -25,9 +25,6 @@ const PATIENCE: u32 = 5;
 /// Time for a port to say that its device has gone, after a transfer that failed.
 const PORT: Duration = Duration::from_millis(20);
 
-/// Time between two looks at what the camera lost.
-const COUNTERS: Duration = Duration::from_millis(500);
-
 /// However much comes, acquiring rests once in such a time, for so much of it: a fifth in all.
 const WORK: Duration = Duration::from_millis(1);
 const SHARE: u32 = 4;
@@ -77,7 +74,7 @@ where
     around.acquired.limit = Limit::NONE;
     let before = arrived(around.outlet, around.acquired);
     let governor = Governor::new(&found.abilities, around.most_ev_s, before);
-    let mut reading = Reading { found, stream, governor, counted: Instant::now() };
+    let mut reading = Reading { found, stream, governor };
     let end = reading.read(port, around).await;
     around.acquired.camera = None;
     around.acquired.limit = Limit::NONE;
@@ -89,8 +86,6 @@ struct Reading<C, D> {
     found: Found<C, D>,
     stream: Stream,
     governor: Governor,
-    /// When the camera was asked what it dropped.
-    counted: Instant,
 }
 
 impl<C, D> Reading<C, D>
@@ -179,10 +174,11 @@ where
     ) -> Result<(), End> {
         let Surroundings { outlet, acquired, .. } = around;
         let now = Instant::now();
-        if let Some(before) = self.found.dropped
-            && now.saturating_duration_since(self.counted) >= COUNTERS
-        {
-            self.counted = now;
+        if !self.governor.is_due(now) {
+            return Ok(());
+        }
+        // Before the limit changes: what was dropped until now was dropped under the one before.
+        if let Some(before) = self.found.dropped {
             let dropped =
                 self.found.registers.read_counter(DROPPED).await.map_err(End::at(DROPPED))?;
             self.found.dropped = Some(dropped);
@@ -194,8 +190,7 @@ where
                 acquired.thinned_by_camera += lost;
             }
         }
-        let events = arrived(outlet, acquired);
-        if let Some(limit) = self.governor.update(now, events) {
+        if let Some(limit) = self.governor.update(now, arrived(outlet, acquired)) {
             self.found.limit(&limit).await?;
             acquired.limit = limit;
         }

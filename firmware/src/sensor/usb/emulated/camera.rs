@@ -78,6 +78,8 @@ pub struct Camera {
     pub dropped: u64,
     /// What the gyro measures all the while, in rad/s.
     pub roll_rad_s: f32,
+    /// How far that swings to either side, in rad/s: see [`swinging`].
+    pub swing_rad_s: f32,
     registers: BTreeMap<Register, u32>,
     events: Vec<Event>,
     at: usize,
@@ -99,6 +101,14 @@ pub struct Camera {
     halted: bool,
     dead: bool,
     odd: bool,
+}
+
+/// What a hand adds to a camera's roll at a time of its clock, in rad/s: to and fro, evenly, by so much to either side.
+#[must_use]
+pub fn swinging(swing_rad_s: f32, t_us: u64) -> f32 {
+    const PERIOD_US: u64 = 700_000;
+    let part = (t_us % PERIOD_US) as f32 / PERIOD_US as f32;
+    swing_rad_s * (1.0 - 4.0 * (part - 0.5).abs())
 }
 
 impl Camera {
@@ -134,6 +144,7 @@ impl Camera {
             skipped: 0,
             dropped: 0,
             roll_rad_s: 0.0,
+            swing_rad_s: 0.0,
             registers: BTreeMap::from(registers),
             events,
             at: 0,
@@ -335,7 +346,9 @@ impl Camera {
                 .map(|event| Event { t_us: event.t_us.saturating_sub(self.origin_us), ..event });
             let event_us = event.map_or(u64::MAX, |event| event.t_us);
             if gyro && self.next_gyro_us <= event_us.min(clock_us) {
-                let sample = GyroSample { t_us: self.next_gyro_us, roll_rad_s: self.roll_rad_s };
+                let t_us = self.next_gyro_us;
+                let roll_rad_s = self.roll_rad_s + swinging(self.swing_rad_s, t_us);
+                let sample = GyroSample { t_us, roll_rad_s };
                 self.next_gyro_us += gyro_us;
                 self.send(started_us + sample.t_us, |words, out| match words {
                     Words::Davis(words) => words.gyro(&sample, range, out),

@@ -16,7 +16,7 @@ use super::Model;
 use super::stream::Stream;
 use crate::sensor::outlet::{Filled, Words as _};
 
-pub use camera::{Camera, Fault, Filters, Packet, Stalled};
+pub use camera::{Camera, Fault, Filters, Packet, Stalled, swinging};
 pub use port::{Act, Device, Pipe, Port, World};
 pub use words::{DavisWords, DvxplorerWords, GyroRange};
 

@@ -16,7 +16,7 @@ fn closes(heard: &Heard, world: &World) {
     assert!(heard.lost <= told, "{} of {told}", heard.lost);
 }
 
-/// Counters are asked twice a second: long enough behind the last event.
+/// Counters are asked ten times a second: long enough behind the last event.
 fn settled(acquired: &Acquired, world: &World) -> bool {
     world
         .camera()
