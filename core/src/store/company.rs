@@ -5,8 +5,12 @@
 //! has nothing to do with the others meets one by chance as rarely. What an edge leaves thus never becomes a smaller share of what is
 //! kept, and mostly a larger one.
 
+use heapless::Vec;
+
 use crate::event::PackedEvent;
 
+/// Events that are looked at at once.
+const AT_ONCE: usize = 64;
 /// Side in pixels of a cell, within which events are near each other, as a power of two: an edge leaves several in it.
 const SIDE_LOG2: u32 = 2;
 /// Columns and rows of cells that are told apart, as powers of two; beyond, they repeat. 512 bytes: all that is left of the
@@ -52,46 +56,54 @@ impl Company {
     pub const NONE: Self = Self { seen: [Seen::NOTHING; WORDS], left: MOMENT, probed: 0, met: 0 };
 
     /// Starts over, with a probe.
+    // Not inlined: it is called in several places.
+    #[inline(never)]
     pub fn clear(&mut self) {
         // In place: flash holds no copy of it.
         (self.probed, self.met) = (0, 0);
         self.seen.fill(Seen::NOTHING);
     }
 
-    /// As many of the events as the moment has left.
-    pub fn moment<'e>(&self, events: &'e [PackedEvent]) -> (&'e [PackedEvent], &'e [PackedEvent]) {
-        events.split_at(events.len().min(self.left))
+    /// As many of the events as the moment has left, and are looked at at once.
+    pub fn moment<'e>(&self, events: &'e [PackedEvent]) -> &'e [PackedEvent] {
+        events.get(..self.left.min(AT_ONCE)).unwrap_or(events)
     }
 
-    /// Whether another event came near this one a moment ago.
-    #[inline(always)]
-    pub fn meets(&mut self, event: PackedEvent) -> bool {
-        let (word, bit) = place(event, SIDE_LOG2);
-        let seen = &mut self.seen[word];
-        let met = (seen.now | seen.before) & bit != 0;
-        seen.now |= bit;
-        met
-    }
-
-    /// These events of the moment went by. Where it is over, the next is half to three halves as long, by the digits of the time: were
-    /// they all alike, noise would come and go with them, and that is a frequency.
-    pub fn pass(&mut self, moment: &[PackedEvent]) {
+    /// Those of a [`moment`](Self::moment) near which another event came a moment ago.
+    #[inline(never)]
+    pub fn found(&mut self, moment: &[PackedEvent]) -> Vec<PackedEvent, AT_ONCE> {
+        let mut found = Vec::new();
+        for event in moment {
+            let (word, bit) = place(*event, SIDE_LOG2);
+            let seen = &mut self.seen[word];
+            let met = (seen.now | seen.before) & bit != 0;
+            seen.now |= bit;
+            if met {
+                found.push(*event).ok();
+            }
+        }
         self.left = self.left.saturating_sub(moment.len());
         if let (0, Some(last)) = (self.left, moment.last()) {
             for seen in &mut self.seen {
                 *seen = Seen { now: 0, before: seen.now };
             }
+            // The next moment is half to three halves as long, by the digits of the time: were they all alike, noise would come and go
+            // with them, and that is a frequency.
             let digits = last.low_us().wrapping_mul(0x9E37_79B9) >> (32 - MOMENT.ilog2());
             self.left = MOMENT / 2 + digits as usize;
         }
+        found
     }
 
-    /// Takes in consecutive events; once there are enough, whether most of what comes is noise, as it was in the segment before or not.
-    pub fn probe(&mut self, events: &[PackedEvent], was_noisy: bool) -> Option<bool> {
-        if self.probed >= PROBE {
-            return None;
+    /// Takes in consecutive events; whether most of what comes is noise, once there are enough, and until then as it was in the segment
+    /// before.
+    #[inline(never)]
+    pub fn probe(&mut self, events: &[PackedEvent], was_noisy: bool) -> bool {
+        let left = PROBE - self.probed;
+        if left == 0 {
+            return was_noisy;
         }
-        for event in events.iter().take((PROBE - self.probed) as usize) {
+        for event in events.iter().take(left as usize) {
             let (word, bit) = place(*event, SIDE_LOG2 + 1);
             let seen = &mut self.seen[word];
             self.met += u32::from(seen.now & bit != 0);
@@ -99,11 +111,10 @@ impl Company {
             self.probed += 1;
         }
         if self.probed < PROBE {
-            return None;
+            return was_noisy;
         }
         self.seen.fill(Seen::NOTHING);
-        let times = if was_noisy { STILL_TIMES } else { MOST_TIMES };
-        Some(self.met < times * BY_CHANCE)
+        self.met < BY_CHANCE * if was_noisy { STILL_TIMES } else { MOST_TIMES }
     }
 }
 
@@ -121,6 +132,7 @@ mod tests {
     use super::*;
     use crate::event::Polarity;
     use crate::store::{Even, MOST_SEGMENTS, MOST_SPARE, Store, StoredEvent};
+    use std::vec::Vec;
 
     /// A number that looks random.
     fn mixed(index: u64) -> u64 {
@@ -152,11 +164,15 @@ mod tests {
     fn noise_is_alone_and_an_edge_is_in_company() {
         let mut company = Company::NONE;
         let (mut met, mut all) = ([0; 2], [0; 2]);
-        for event in (0..50_000).map(scene) {
-            let edge = usize::from(event.is_brighter());
-            met[edge] += u32::from(company.meets(event));
-            all[edge] += 1;
-            company.pass(&[event]);
+        let events: Vec<_> = (0..50_000).map(scene).collect();
+        let mut rest = &events[..];
+        while !rest.is_empty() {
+            let moment = company.moment(rest);
+            rest = &rest[moment.len()..];
+            moment.iter().for_each(|event| all[usize::from(event.is_brighter())] += 1);
+            for event in company.found(moment) {
+                met[usize::from(event.is_brighter())] += 1;
+            }
         }
         assert!(met[0] * 4 < all[0], "{met:?} of {all:?}");
         assert!(met[1] * 2 > all[1], "{met:?} of {all:?}");
@@ -168,9 +184,9 @@ mod tests {
             for was_noisy in [false, true] {
                 let events: Vec<_> = (from..from + 1_000).map(noise).collect();
                 let mut company = Company::NONE;
-                assert_eq!(company.probe(&events[..300], was_noisy), None);
-                assert_eq!(company.probe(&events[300..450], was_noisy), Some(true));
-                assert_eq!(company.probe(&events[450..], was_noisy), None, "once is enough");
+                assert_eq!(company.probe(&events[..300], was_noisy), was_noisy);
+                assert!(company.probe(&events[300..450], was_noisy));
+                assert!(!company.probe(&events[450..], false), "once is enough");
                 // A wheel that fills a fifth of the picture.
                 let wheel = (20 * from..).map(noise).filter(|event| {
                     let (x, y) = event.pixel();
@@ -179,7 +195,7 @@ mod tests {
                 });
                 let wheel: Vec<_> = wheel.take(400).collect();
                 company.clear();
-                assert_eq!(company.probe(&wheel, was_noisy), Some(false));
+                assert!(!company.probe(&wheel, was_noisy));
             }
         }
     }

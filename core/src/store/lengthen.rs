@@ -52,12 +52,9 @@ impl Store<'_> {
                     }
                 }
                 // An old segment that is split gives each part of its count as it gives events.
-                let share = |all: u64, index: usize| all * index as u64 / segment.len.max(1) as u64;
-                let part = |all: u64| share(all, index) - share(all, before);
-                merged.counted += part(segment.counted);
-                merged.alone += part(segment.alone);
-                // As the open one, which is the last, goes on.
-                (merged.crowded, merged.noisy) = (segment.crowded, segment.noisy);
+                let share =
+                    |index: usize| segment.counted * index as u64 / segment.len.max(1) as u64;
+                merged.counted += share(index) - share(before);
                 if index < segment.len {
                     break;
                 }
@@ -68,6 +65,9 @@ impl Store<'_> {
                 if ((i - held) as u64 * old_us) / u64::from(segment_us) == nth {
                     merged.lost = merged.lost.saturating_add(segment.lost);
                     merged.unmeasured = merged.unmeasured.saturating_add(segment.unmeasured);
+                    merged.alone = merged.alone.saturating_add(segment.alone);
+                    // As the open one, which is the last, goes on.
+                    (merged.crowded, merged.noisy) = (segment.crowded, segment.noisy);
                     merged.rates = merged.rates.and(segment.rates);
                 }
             }

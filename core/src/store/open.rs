@@ -20,7 +20,7 @@ pub(super) struct Segment {
     /// Events that came, each for as many as it stands for.
     pub counted: u64,
     /// Of these, noise that was left out.
-    pub alone: u64,
+    pub alone: u32,
     /// Events that were handed in and that no window has measured yet.
     pub unmeasured: u32,
     /// Events that were lost before.
@@ -47,7 +47,7 @@ impl Segment {
             let overfull = events.checked_div(capacity as u64).unwrap_or(0);
             overfull.checked_ilog2().unwrap_or(0) as u8
         };
-        let stride_log2 = overfull_log2(before.counted.saturating_sub(before.alone));
+        let stride_log2 = overfull_log2(before.counted.saturating_sub(before.alone.into()));
         let crowded = overfull_log2(before.counted) > 0;
         Self {
             stride_log2: stride_log2.min(MOST_WEIGHT_LOG2),
@@ -73,8 +73,6 @@ impl Segment {
 impl Store<'_> {
     /// Takes in events of the open segment, each of which stands for 2^`weight_log2`: the others were thinned before. `kept` hears
     /// of those that it keeps, and of how many each stands for then, as a power of two.
-    // A function of its own, so that all it needs stays in registers.
-    #[inline(never)]
     pub fn push(
         &mut self,
         events: &[PackedEvent],
@@ -82,16 +80,44 @@ impl Store<'_> {
         mut kept: impl FnMut(PackedEvent, u8),
     ) {
         let slot = self.slot(self.closed);
+        let arrived = (events.len() as u64) << weight_log2;
+        self.thinned += arrived;
+        let segment = &mut self.segments[slot];
+        segment.heaviest_log2 = segment.heaviest_log2.max(weight_log2);
+        segment.counted += arrived;
+        segment.unmeasured = segment.unmeasured.saturating_add(events.len() as u32);
+        let mut rest = events;
+        if !self.leaves_noise(slot) {
+            let taken = self.keep(slot, events, weight_log2, &mut kept);
+            rest = events.get(taken..).unwrap_or_default();
+        }
+        while !rest.is_empty() {
+            let moment = self.company.moment(rest);
+            rest = rest.get(moment.len()..).unwrap_or_default();
+            let found = self.company.found(moment);
+            let alone = ((moment.len() - found.len()) as u32) << weight_log2;
+            let segment = &mut self.segments[slot];
+            segment.alone = segment.alone.saturating_add(alone);
+            self.keep(slot, &found, weight_log2, &mut kept);
+        }
+    }
+
+    /// Keeps what there is room for of these events; returns how many it went through: up to where noise is left out.
+    // A function of its own, so that all it needs stays in registers.
+    #[inline(never)]
+    fn keep(
+        &mut self,
+        slot: usize,
+        events: &[PackedEvent],
+        weight_log2: u8,
+        kept: &mut impl FnMut(PackedEvent, u8),
+    ) -> usize {
         let skip = self.segments[slot].skip;
         // What is to be passed over, in these events, and what is left of it that is less than one stands for.
         let (mut next, mut rest) = ((skip >> weight_log2) as usize, skip);
-        let mut count = 0;
-        let mut leaves_noise = self.leaves_noise(slot);
-        if leaves_noise {
-            // Only what is in company is passed over.
-            next = 0;
-        }
-        while next < events.len() && !leaves_noise {
+        let (mut count, mut end_of_burst) = (0, events.len());
+        let probes = self.segments[slot].crowded && !self.leaves_noise(slot);
+        while next < end_of_burst {
             if self.segments[slot].len >= self.capacity {
                 self.make_room(slot);
             }
@@ -115,87 +141,25 @@ impl Store<'_> {
                 break;
             }
             segment.len += count - before;
-            if segment.crowded && step_log2 == 0 {
-                self.probe(slot, &events[next..next + count - before]);
-                leaves_noise = self.leaves_noise(slot);
-            }
+            let from = next;
             next += (count - before) << stride_log2;
             rest = (1 << step_log2) - 1;
+            if probes && step_log2 == 0 {
+                segment.noisy = self.company.probe(&events[from..next], segment.noisy);
+                end_of_burst = if self.leaves_noise(slot) { next } else { end_of_burst };
+            }
         }
-        if leaves_noise {
-            count +=
-                self.push_in_company(slot, &events[next.min(events.len())..], weight_log2, kept);
-        } else {
-            rest &= (1 << weight_log2) - 1;
-            let skip = (next.saturating_sub(events.len()) as u32) << weight_log2 | rest;
-            self.segments[slot].skip = skip;
-        }
-        let segment = &mut self.segments[slot];
-        segment.heaviest_log2 = segment.heaviest_log2.max(weight_log2);
-        let arrived = (events.len() as u64) << weight_log2;
-        segment.counted += arrived;
-        segment.unmeasured = segment.unmeasured.saturating_add(events.len() as u32);
-        self.thinned += arrived - count as u64;
+        rest &= (1 << weight_log2) - 1;
+        let skip = (next.saturating_sub(end_of_burst) as u32) << weight_log2 | rest;
+        self.segments[slot].skip = skip;
+        self.thinned -= count as u64;
+        end_of_burst
     }
 
     /// Whether what is alone is left out from here on.
     const fn leaves_noise(&self, slot: usize) -> bool {
         let segment = &self.segments[slot];
         segment.noisy && segment.len >= as_they_came(self.capacity, 0)
-    }
-
-    /// Looks at events of the burst whether most are noise.
-    #[inline(never)]
-    fn probe(&mut self, slot: usize, burst: &[PackedEvent]) {
-        let segment = &mut self.segments[slot];
-        if let Some(noisy) = self.company.probe(burst, segment.noisy) {
-            segment.noisy = noisy;
-        }
-    }
-
-    /// Takes in events behind the burst of which those that are alone are left out; returns how many it keeps.
-    #[inline(never)]
-    fn push_in_company(
-        &mut self,
-        slot: usize,
-        events: &[PackedEvent],
-        weight_log2: u8,
-        mut kept: impl FnMut(PackedEvent, u8),
-    ) -> usize {
-        let mut skip = self.segments[slot].skip >> weight_log2;
-        let (mut count, mut in_company, mut rest) = (0, 0, events);
-        while !rest.is_empty() {
-            let (moment, later) = self.company.moment(rest);
-            for event in moment {
-                if !self.company.meets(*event) {
-                    continue;
-                }
-                in_company += 1;
-                if skip > 0 {
-                    skip -= 1;
-                    continue;
-                }
-                if self.segments[slot].len >= self.capacity {
-                    self.make_room(slot);
-                }
-                let segment = &mut self.segments[slot];
-                let stands_log2 = segment.step(self.capacity).0.max(weight_log2);
-                let place = self.events.get_mut(slot * self.capacity + segment.len);
-                if let Some(place) = place {
-                    *place = StoredEvent::store(*event, stands_log2);
-                    kept(*event, stands_log2);
-                    segment.len += 1;
-                    count += 1;
-                    skip = (1_u32 << (stands_log2 - weight_log2)) - 1;
-                }
-            }
-            self.company.pass(moment);
-            rest = later;
-        }
-        let segment = &mut self.segments[slot];
-        segment.skip = skip << weight_log2;
-        segment.alone += ((events.len() - in_company) as u64) << weight_log2;
-        count
     }
 
     /// Makes room in a full segment: every other event behind the burst goes.
