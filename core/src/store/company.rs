@@ -1,0 +1,240 @@
+//! Events that are alone: noise, which a store that is too small for all that comes need not keep.
+//!
+//! What moves fires pixels side by side, one after the other; noise fires one here, one there. So an event is in company where
+//! another came nearby a moment ago. A moment is so many events, not so long a time: whatever the rate, an event that
+//! has nothing to do with the others meets one by chance as rarely. What an edge leaves thus never becomes a smaller share of what is
+//! kept, and mostly a larger one.
+
+use heapless::Vec;
+
+use crate::event::PackedEvent;
+
+/// Events that are looked at at once.
+const AT_ONCE: usize = 64;
+/// Side in pixels of a cell, within which events are near each other, as a power of two: an edge leaves several in it.
+const SIDE_LOG2: u32 = 2;
+/// Columns and rows of cells that are told apart, as powers of two; beyond, they repeat. 512 bytes: all that is left of the
+/// device's memory.
+const COLUMNS_LOG2: u32 = 6;
+const ROWS_LOG2: u32 = 5;
+const CELLS: usize = 1 << (COLUMNS_LOG2 + ROWS_LOG2);
+const WORDS: usize = CELLS / u32::BITS as usize;
+/// Events in a moment, on average: so few that one in six unrelated ones meets another, in this moment or the one before.
+const MOMENT: usize = CELLS / 8;
+/// Most is noise where one in so many events at most is in company; and where it was in the segment before, so that it is not left
+/// out by turns.
+const ONE_IN: u32 = 4;
+const STILL_ONE_IN: u32 = 3;
+
+/// Cells, a bit each, in which events came in this moment and in the one before.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    now: u32,
+    before: u32,
+}
+
+impl Seen {
+    const NOTHING: Self = Self { now: 0, before: 0 };
+}
+
+/// Where events came a moment ago.
+#[derive(Debug)]
+pub(super) struct Company {
+    seen: [Seen; WORDS],
+    /// Events until the moment ends.
+    left: usize,
+    /// Events that were looked at, and those of them that are in company.
+    all: u32,
+    met: u32,
+}
+
+impl Company {
+    pub const NONE: Self = Self { seen: [Seen::NOTHING; WORDS], left: MOMENT, all: 0, met: 0 };
+
+    /// Starts over.
+    // Not inlined: it is called in several places.
+    #[inline(never)]
+    pub fn clear(&mut self) {
+        // In place: flash holds no copy of it.
+        (self.all, self.met) = (0, 0);
+        self.seen.fill(Seen::NOTHING);
+    }
+
+    /// Whether most of what was looked at is noise, where it was or was not before. Less than a moment does not tell.
+    pub const fn is_noisy(&self, was_noisy: bool) -> bool {
+        let one_in = if was_noisy { STILL_ONE_IN } else { ONE_IN };
+        self.all >= MOMENT as u32 && self.met.saturating_mul(one_in) < self.all
+    }
+
+    /// As many of the events as the moment has left, and are looked at at once.
+    pub fn moment<'e>(&self, events: &'e [PackedEvent]) -> &'e [PackedEvent] {
+        events.get(..self.left.min(AT_ONCE)).unwrap_or(events)
+    }
+
+    /// Those of a [`moment`](Self::moment) near which another event came a moment ago.
+    #[inline(never)]
+    pub fn found(&mut self, moment: &[PackedEvent]) -> Vec<PackedEvent, AT_ONCE> {
+        let mut found = Vec::new();
+        for event in moment {
+            let (word, bit) = place(*event);
+            let seen = &mut self.seen[word];
+            let met = (seen.now | seen.before) & bit != 0;
+            seen.now |= bit;
+            if met {
+                found.push(*event).ok();
+            }
+        }
+        self.all = self.all.saturating_add(moment.len() as u32);
+        self.met = self.met.saturating_add(found.len() as u32);
+        self.left = self.left.saturating_sub(moment.len());
+        if let (0, Some(last)) = (self.left, moment.last()) {
+            for seen in &mut self.seen {
+                *seen = Seen { now: 0, before: seen.now };
+            }
+            // The next moment is half to three halves as long, by the digits of the time: were they all alike, noise would come and go
+            // with them, and that is a frequency.
+            let digits = last.low_us().wrapping_mul(0x9E37_79B9) >> (32 - MOMENT.ilog2());
+            self.left = MOMENT / 2 + digits as usize;
+        }
+        found
+    }
+}
+
+/// Word and bit of the cell that an event lies in.
+#[inline(always)]
+const fn place(event: PackedEvent) -> (usize, u32) {
+    let (x, y) = event.pixel();
+    let column = x as u32 >> SIDE_LOG2 & ((1 << COLUMNS_LOG2) - 1);
+    let row = y as u32 >> SIDE_LOG2 & ((1 << ROWS_LOG2) - 1);
+    ((row << (COLUMNS_LOG2 - 5) | column >> 5) as usize % WORDS, 1 << (column & 31))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::event::Polarity;
+    use crate::store::{Even, MOST_SEGMENTS, MOST_SPARE, Store, StoredEvent};
+    use std::vec::Vec;
+
+    /// A number that looks random.
+    fn mixed(index: u64) -> u64 {
+        let mixed = (index + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        let mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB) >> 20
+    }
+
+    fn noise(index: u64) -> PackedEvent {
+        let place = mixed(index);
+        PackedEvent::new(
+            index as u32,
+            (place % 346) as u16,
+            (place / 346 % 260) as u16,
+            Polarity::Off,
+        )
+    }
+
+    /// An upright edge of 60 pixels that moves to the right by a pixel in 1 000 events, a twentieth of which it leaves.
+    fn scene(index: u64) -> PackedEvent {
+        if !mixed(index).is_multiple_of(20) {
+            return noise(index);
+        }
+        let x = 100 + index / 1_000 % 60;
+        PackedEvent::new(index as u32, x as u16, 90 + (mixed(index) / 32 % 60) as u16, Polarity::On)
+    }
+
+    #[test]
+    fn noise_is_alone_and_an_edge_is_in_company() {
+        let mut company = Company::NONE;
+        let (mut met, mut all) = ([0; 2], [0; 2]);
+        let events: Vec<_> = (0..50_000).map(scene).collect();
+        let mut rest = &events[..];
+        while !rest.is_empty() {
+            let moment = company.moment(rest);
+            rest = &rest[moment.len()..];
+            moment.iter().for_each(|event| all[usize::from(event.is_brighter())] += 1);
+            for event in company.found(moment) {
+                met[usize::from(event.is_brighter())] += 1;
+            }
+        }
+        assert!(met[0] * 4 < all[0], "{met:?} of {all:?}");
+        assert!(met[1] * 2 > all[1], "{met:?} of {all:?}");
+    }
+
+    #[test]
+    fn most_is_noise_or_is_not() {
+        for from in [0, 1_000, 10_000] {
+            let noisy = |events: &[PackedEvent], was_noisy| {
+                let mut company = Company::NONE;
+                let mut rest = events;
+                while !rest.is_empty() {
+                    let moment = company.moment(rest);
+                    company.found(moment);
+                    rest = &rest[moment.len()..];
+                }
+                company.is_noisy(was_noisy)
+            };
+            let events: Vec<_> = (from..from + 400).map(noise).collect();
+            // A wheel that fills a fifth of the picture, with ten spokes.
+            let wheel = (20 * from..).map(noise).filter(|event| {
+                let (x, y) = event.pixel();
+                let (dx, dy) = (f64::from(x) - 173.0, f64::from(y) - 130.0);
+                dx.hypot(dy) < 80.0
+                    && (dy.atan2(dx) / std::f64::consts::TAU * 10.0).fract().abs() < 0.1
+            });
+            let wheel: Vec<_> = wheel.take(400).collect();
+            for was_noisy in [false, true] {
+                assert!(noisy(&events, was_noisy));
+                assert!(!noisy(&wheel, was_noisy));
+            }
+        }
+    }
+
+    /// A store as large as the device's, after six segments of so many events; shares of the edge among what is evenly kept of it, by
+    /// segment.
+    fn shares(events: impl Fn(u64) -> PackedEvent, segment: u64) -> (Vec<f32>, u64) {
+        let mut memory = vec![StoredEvent::default(); MOST_SEGMENTS * 1_638];
+        let mut store = Store::new(&mut memory, MOST_SPARE, segment as u32);
+        for index in 0..6 * segment - 1 {
+            while index >= store.open_end_us() {
+                store.close_segment();
+            }
+            store.push(&[events(index)], 0, |_, _| {});
+        }
+        let account = store.account(6);
+        assert_eq!(account.counted, 6 * segment - 1);
+        assert_eq!(account.counted, account.kept + account.noise + store.thinned());
+        assert_eq!(account.noise, store.noise());
+        let window = store.window(6, u64::MAX);
+        let mut even = Even::default();
+        let mut found = Vec::new();
+        for _ in 0..6 {
+            even.weigh(&window, |_| true);
+        }
+        for _ in 0..6 {
+            let (mut edge, mut all) = (0.0, 0.0);
+            even.step(&window, usize::MAX, Some, |_, event| {
+                edge += f32::from(u8::from(event.is_on()));
+                all += 1.0;
+            });
+            found.push(edge / all);
+        }
+        (found, account.kept)
+    }
+
+    #[test]
+    fn a_store_that_is_too_small_keeps_what_moves() {
+        let (shares, kept) = shares(scene, 30_000);
+        // It is the burst of a full segment that tells of the noise.
+        assert!(shares[0] < 0.08, "{shares:?}");
+        // Twice as much of the edge, at least.
+        assert!(shares[1..].iter().all(|share| *share > 0.1), "{shares:?}");
+        assert!(kept > 6 * 1_100, "{kept}");
+    }
+
+    #[test]
+    fn a_store_that_holds_all_keeps_the_noise() {
+        let (shares, kept) = shares(scene, 1_600);
+        assert_eq!(kept, 6 * 1_600 - 1);
+        assert!(shares.iter().all(|share| *share < 0.08), "{shares:?}");
+    }
+}
