@@ -41,7 +41,7 @@ impl Seen {
 #[derive(Debug)]
 pub(super) struct Company {
     seen: [Seen; WORDS],
-    /// Events until the moment ends.
+    /// Events until the moment ends; 0: the next begins with the next event.
     left: usize,
     /// Events that were looked at, and those of them that are in company.
     all: u32,
@@ -49,15 +49,14 @@ pub(super) struct Company {
 }
 
 impl Company {
-    pub const NONE: Self = Self { seen: [Seen::NOTHING; WORDS], left: MOMENT, all: 0, met: 0 };
+    // Nothing but zeros, so that flash holds no copy of it.
+    pub const NONE: Self = Self { seen: [Seen::NOTHING; WORDS], left: 0, all: 0, met: 0 };
 
     /// Starts over.
     // Not inlined: it is called in several places.
     #[inline(never)]
     pub fn clear(&mut self) {
-        // In place: flash holds no copy of it.
-        (self.all, self.met) = (0, 0);
-        self.seen.fill(Seen::NOTHING);
+        *self = Self::NONE;
     }
 
     /// Whether most of what was looked at is noise, where it was or was not before. Less than a moment does not tell.
@@ -68,12 +67,22 @@ impl Company {
 
     /// As many of the events as the moment has left, and are looked at at once.
     pub fn moment<'e>(&self, events: &'e [PackedEvent]) -> &'e [PackedEvent] {
-        events.get(..self.left.min(AT_ONCE)).unwrap_or(events)
+        let left = if self.left > 0 { self.left } else { AT_ONCE };
+        events.get(..left.min(AT_ONCE)).unwrap_or(events)
     }
 
     /// Those of a [`moment`](Self::moment) near which another event came a moment ago.
     #[inline(never)]
     pub fn found(&mut self, moment: &[PackedEvent]) -> Vec<PackedEvent, AT_ONCE> {
+        if let (0, Some(first)) = (self.left, moment.first()) {
+            for seen in &mut self.seen {
+                *seen = Seen { now: 0, before: seen.now };
+            }
+            // Half to three halves as long as the average, by the digits of the time: were they all alike, noise would come and go
+            // with them, and that is a frequency.
+            let digits = first.low_us().wrapping_mul(0x9E37_79B9) >> (32 - MOMENT.ilog2());
+            self.left = MOMENT / 2 + digits as usize;
+        }
         let mut found = Vec::new();
         for event in moment {
             let (word, bit) = place(*event);
@@ -84,18 +93,9 @@ impl Company {
                 found.push(*event).ok();
             }
         }
+        self.left = self.left.saturating_sub(moment.len());
         self.all = self.all.saturating_add(moment.len() as u32);
         self.met = self.met.saturating_add(found.len() as u32);
-        self.left = self.left.saturating_sub(moment.len());
-        if let (0, Some(last)) = (self.left, moment.last()) {
-            for seen in &mut self.seen {
-                *seen = Seen { now: 0, before: seen.now };
-            }
-            // The next moment is half to three halves as long, by the digits of the time: were they all alike, noise would come and go
-            // with them, and that is a frequency.
-            let digits = last.low_us().wrapping_mul(0x9E37_79B9) >> (32 - MOMENT.ilog2());
-            self.left = MOMENT / 2 + digits as usize;
-        }
         found
     }
 }
