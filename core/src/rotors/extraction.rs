@@ -280,6 +280,8 @@ impl Extraction {
     }
 
     /// Ends with the candidates that there are.
+    // Nor this, in six.
+    #[inline(never)]
     fn done(&mut self) {
         // A piece of a rotor, or a rotor by the line of its neighbour, explains fewer events than the rotor by
         // its own line.

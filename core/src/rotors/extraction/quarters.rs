@@ -154,6 +154,8 @@ impl Extraction {
     }
 
     /// Goes on with the next quarter of the picture, or ends.
+    // Not inlined: it is called in three places.
+    #[inline(never)]
     pub(super) fn next_quarter(&mut self) {
         if self.quarter == QUARTERS || self.taken.is_full() {
             return self.end();
