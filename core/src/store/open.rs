@@ -78,29 +78,30 @@ impl Store<'_> {
         let slot = self.slot(self.closed);
         let segment = &mut self.segments[slot];
         segment.unmeasured = segment.unmeasured.saturating_add(events.len() as u32);
+        let burst = as_they_came(self.capacity, 0);
         let mut rest = events;
         while !rest.is_empty() {
             let &Segment { is_crowded, is_noisy, len, .. } = &self.segments[slot];
-            let in_burst = len < as_they_came(self.capacity, 0);
-            if !is_crowded || !(in_burst || is_noisy) {
+            let in_burst = burst.saturating_sub(len);
+            if !is_crowded || (in_burst == 0 && !is_noisy) {
                 self.keep(slot, rest, weight_log2, &mut kept);
                 return;
+            }
+            if in_burst > 0 {
+                // Each of these is kept.
+                let (some, later) = rest.split_at(rest.len().min(in_burst));
+                self.keep(slot, some, weight_log2, &mut kept);
+                self.segments[slot].is_noisy = self.company.probe(some, is_noisy);
+                rest = later;
+                continue;
             }
             let moment = self.company.moment(rest);
             rest = rest.get(moment.len()..).unwrap_or_default();
             let found = self.company.found(moment);
-            if in_burst {
-                self.keep(slot, moment, weight_log2, &mut kept);
-                let segment = &mut self.segments[slot];
-                if segment.len >= as_they_came(self.capacity, 0) {
-                    segment.is_noisy = self.company.is_noisy(is_noisy);
-                }
-            } else {
-                self.keep(slot, &found, weight_log2, &mut kept);
-                let alone = ((moment.len() - found.len()) as u64) << weight_log2;
-                self.segments[slot].noise += alone;
-                self.noise += alone;
-            }
+            self.keep(slot, &found, weight_log2, &mut kept);
+            let alone = ((moment.len() - found.len()) as u64) << weight_log2;
+            self.segments[slot].noise += alone;
+            self.noise += alone;
         }
     }
 
