@@ -305,7 +305,7 @@ impl Pose {
         if self.schedule.phase() == Phase::Last {
             self.slope = self.trend(sums);
             if self.slope.is_none() && self.harmonic > self.first_harmonic {
-                // Too few blocks are in step.
+                // Too few blocks are in step, or the path slipped.
                 self.step_back();
                 return false;
             }

@@ -36,9 +36,11 @@ const LOCK_AGREEMENT: f32 = 2e-3;
 const LOCK_SIGMAS: f32 = 8.0;
 /// A lock with a larger relative error is only coarse.
 const MOST_LOCK_SIGMA: f32 = 3e-3;
-/// Correlation of the witnesses' errors: the lock registers a part of the events that the phase is followed by. More than the
-/// 0.2 that is seen where both are known, as either may be biased.
-const IN_COMMON: f32 = 0.5;
+/// Correlation of the witnesses' errors, as seen where both are known: the lock registers a part of the events that the phase is
+/// followed by.
+const IN_COMMON: f32 = 0.2;
+/// So many standard errors apart, witnesses of a lock are nothing unusual.
+const USUAL_SIGMAS: f32 = 2.0;
 /// Share of a coarse reading's error that is left where the witnesses of the lock agree.
 const ALIKE_SIGMA: f32 = 0.2;
 /// A coarse reading's phase must give its speed and be straight within these shares, and the initial alignment of
@@ -83,16 +85,17 @@ impl Measurement {
         // What jitter leads astray says nothing.
         let lock = lock.filter(|lock| self.registers() || self.bears_out(*lock, phase));
         if let (Some(lock), Some(phase)) = (lock, phase) {
-            let mut both = combine(lock, phase);
-            // A lock's scatter does not show how the speed changed meanwhile: it is no surer than the phase can bear it out.
-            both.sigma_rad_s = both.sigma_rad_s.max(phase.sigma_rad_s / LOCK_SIGMAS);
+            // The phase follows all the events that the lock registers some of, and shows how the speed changed meanwhile, which the
+            // lock's scatter does not: the lock is no surer.
+            let witness = Estimate { sigma_rad_s: lock.sigma_rad_s.max(phase.sigma_rad_s), ..lock };
+            let both = combine(witness, phase, 1.0);
             let sharp = both.sigma_rad_s.max(held_up * both.omega_rad_s.abs())
                 < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
             let long = self.wanted_us <= 1.02 * window.duration_us as f32;
             if !self.bears_out(lock, Some(phase)) {
                 self.status = Status::Refused(Reason::Ambiguous);
             } else if sharp && long {
-                self.estimate = both;
+                self.estimate = combine(witness, phase, USUAL_SIGMAS);
                 self.status = Status::Locked;
             } else if sharp {
                 // Right if the parts are as alike as they look: the window shows too few to be sure.
@@ -110,7 +113,7 @@ impl Measurement {
             self.status = Status::Refused(Reason::Ambiguous);
         }
         if let (None, Some(phase)) = (lock, phase) {
-            let both = combine(self.estimate, phase);
+            let both = combine(self.estimate, phase, 1.0);
             let sigma_rad_s = both.sigma_rad_s.max(self.estimate.sigma_rad_s);
             self.estimate = Estimate { sigma_rad_s, ..both };
         }
@@ -261,19 +264,20 @@ impl Measurement {
     }
 }
 
-/// Mean weighted by the inverse variances, of witnesses whose errors have something in common.
+/// Mean weighted by the inverse variances, of witnesses whose errors have something in common, and which may be so many standard
+/// errors apart.
 // Not inlined: it is called in several places.
 #[inline(never)]
-fn combine(a: Estimate, b: Estimate) -> Estimate {
+fn combine(a: Estimate, b: Estimate, usual_sigmas: f32) -> Estimate {
     let (va, vb) = (a.sigma_rad_s * a.sigma_rad_s, b.sigma_rad_s * b.sigma_rad_s);
     let (wa, wb) = (vb / (va + vb), va / (va + vb));
     // Where they are farther apart than their errors say, these are too small by as much (Birge's ratio).
-    let apart = (a.omega_rad_s - b.omega_rad_s) * (a.omega_rad_s - b.omega_rad_s) / (va + vb);
+    let apart = (a.omega_rad_s - b.omega_rad_s) / usual_sigmas;
     let (ea, eb) = (wa * a.sigma_rad_s, wb * b.sigma_rad_s);
     let variance = ea * ea + eb * eb + 2.0 * IN_COMMON * ea * eb;
     Estimate {
         omega_rad_s: a.omega_rad_s * wa + b.omega_rad_s * wb,
-        sigma_rad_s: sqrt(variance * apart.max(1.0)),
+        sigma_rad_s: sqrt(variance * (apart * apart / (va + vb)).max(1.0)),
     }
 }
 

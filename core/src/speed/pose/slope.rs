@@ -8,12 +8,18 @@ use super::super::statistics::student_over_normal;
 use super::super::trend::{Point, Trend};
 use super::{Pose, Sums};
 use crate::limits::MAX_KNOTS;
-use crate::math::sqrt;
+use crate::math::{TAU, larger, sqrt};
 
 /// Symmetry periods in the window from which on places in the period get offsets of their own.
 const FOLDED_PERIODS: usize = 3;
-/// Blocks over which the wandering of the axis is judged.
-const DRIFT_BLOCKS: usize = 12;
+/// Length of the pieces of the window between which the wandering of the axis is judged: a hand trembles up to 12 Hz, and what a host
+/// shakes at 35 Hz and more is as good as even over them. A long window has so many, a short one no fewer than these.
+const DRIFT_PIECE_US: f32 = 25_000.0;
+const DRIFT_PIECES: usize = 12;
+const LEAST_PIECES: usize = 4;
+/// No rotor turns by this share of a cycle of its harmonic beyond an even turn from a block to the next: the path has slipped to another
+/// edge of the template. Blocks of the fewest events scatter by a tenth of a cycle.
+const SLIP_CYCLES: f32 = 0.4;
 
 /// The turn followed through the window.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -28,8 +34,18 @@ pub struct Slope {
     pub drift_px_s: f32,
 }
 
+/// Whether the turn goes by `most_rad` beyond an even one from a block in step to the next.
+fn slips(points: &[Point], most_rad: f32) -> bool {
+    let seen = || points.iter().filter(|point| point.weight > 0.0);
+    let (Some(first), Some(last)) = (seen().next(), seen().next_back()) else { return false };
+    let even = (last.y - first.y) / larger(last.u - first.u, f32::MIN_POSITIVE);
+    let off = |(a, b): (&Point, &Point)| (b.y - a.y - even * (b.u - a.u)).abs();
+    seen().zip(seen().skip(1)).map(off).any(|off_rad| off_rad > most_rad)
+}
+
 impl Pose {
-    /// The trend of the turn through the blocks, and how the axis wanders; `None` when too few blocks tell.
+    /// The trend of the turn through the blocks, and how the axis wanders; `None` when too few blocks tell, or the path
+    /// has slipped.
     pub(super) fn trend(&self, sums: &Sums) -> Option<Slope> {
         let count = self.path.blocks();
         let periods = count / self.in_period.max(1);
@@ -40,6 +56,9 @@ impl Pose {
             let (off_rad, weight) = block.turn_rad(self.harmonic as f32).unwrap_or_default();
             let y = self.path.at(t_us).turn_rad + off_rad;
             points.push(Point { u: t_us / half_us, y, weight }).ok();
+        }
+        if slips(&points, SLIP_CYCLES * TAU / self.harmonic as f32) {
+            return None;
         }
         // Blocks a period apart see the same pixels, unless the axis wanders: what tells more exactly.
         let folded = periods >= FOLDED_PERIODS && self.in_period > 1;
@@ -62,7 +81,9 @@ impl Pose {
     }
 
     fn drift_px_s(&self) -> f32 {
-        let size = self.path.blocks().div_ceil(DRIFT_BLOCKS).max(1);
+        let blocks = self.path.blocks();
+        let long = crate::math::ceil(DRIFT_PIECE_US / self.path.step_us()) as usize;
+        let size = long.min(blocks / LEAST_PIECES).max(blocks.div_ceil(DRIFT_PIECES)).max(1);
         let dt_s = size as f32 * self.path.step_us() * 1e-6;
         let mean = |knots: &[Knot]| {
             let n = knots.len() as f32;
@@ -80,5 +101,33 @@ impl Pose {
             before = Some(here);
         }
         sqrt(squares / f32::from(count.max(1)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Turns of 40 blocks, every fifth not in step: `jump_rad` in the middle, and a scatter of a tenth of a cycle of the
+    /// harmonic 12 about a speed that changes.
+    fn points(jump_rad: f32) -> Vec<Point, MAX_KNOTS> {
+        (0..40_usize)
+            .map(|i| {
+                let u = (i as f32 - 19.5) / 20.0;
+                let scatter = 0.05 * ((i * 7 % 11) as f32 - 5.0) / 5.0;
+                let y = 0.8 * u + 0.1 * u * u + scatter + if i < 20 { 0.0 } else { jump_rad };
+                Point { u, y, weight: if i % 5 == 0 { 0.0 } else { 50.0 } }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_turn_by_a_cycle_of_the_harmonic_is_a_slip() {
+        let cycle_rad = TAU / 12.0;
+        for jump_rad in [cycle_rad, -cycle_rad] {
+            assert!(slips(&points(jump_rad), SLIP_CYCLES * cycle_rad));
+        }
+        assert!(!slips(&points(0.0), SLIP_CYCLES * cycle_rad));
+        assert!(!slips(&[], SLIP_CYCLES * cycle_rad));
     }
 }
