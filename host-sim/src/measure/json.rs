@@ -24,8 +24,10 @@ pub struct Document {
     pub duration_s: f64,
     /// Events in the file.
     pub events: u64,
-    /// Events left out on purpose.
+    /// Events left out on purpose, evenly.
     pub thinned: u64,
+    /// Events left out because they were alone, as noise is.
+    pub noise: u64,
     /// Events that the sensor or the link lost.
     pub lost: u64,
     /// "locked", "coarse" or "refused".
@@ -97,8 +99,10 @@ pub struct FileFacts {
     pub last_us: u64,
     /// Events in the file.
     pub events: u64,
-    /// Events left out on purpose.
+    /// Events left out on purpose, evenly.
     pub thinned: u64,
+    /// Events left out because they were alone, as noise is.
+    pub noise: u64,
     /// Events lost.
     pub lost: u64,
 }
@@ -162,6 +166,7 @@ impl Document {
             duration_s: facts.last_us.saturating_sub(facts.first_us) as f64 / 1e6,
             events: facts.events,
             thinned: facts.thinned,
+            noise: facts.noise,
             lost: facts.lost,
             status: summary.status.as_str(),
             reason: reason(summary.status),
