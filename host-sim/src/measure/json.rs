@@ -24,10 +24,8 @@ pub struct Document {
     pub duration_s: f64,
     /// Events in the file.
     pub events: u64,
-    /// Events left out on purpose, evenly.
+    /// Events left out on purpose: evenly, or because they were alone, as noise is.
     pub thinned: u64,
-    /// Events left out because they were alone, as noise is.
-    pub noise: u64,
     /// Events that the sensor or the link lost.
     pub lost: u64,
     /// "locked", "coarse" or "refused".
@@ -165,8 +163,7 @@ impl Document {
             height_px: facts.size_px.1,
             duration_s: facts.last_us.saturating_sub(facts.first_us) as f64 / 1e6,
             events: facts.events,
-            thinned: facts.thinned,
-            noise: facts.noise,
+            thinned: facts.thinned + facts.noise,
             lost: facts.lost,
             status: summary.status.as_str(),
             reason: reason(summary.status),

@@ -289,6 +289,7 @@ impl Script {
             "seen": camera.seen,
             "filtered": camera.filtered,
             "skipped": camera.skipped,
+            "skip_orders": camera.skip_orders(),
             "dropped": camera.dropped,
             "waiting_bytes": camera.waiting_bytes(),
             "done": camera.is_done(),

@@ -301,6 +301,19 @@ impl Camera {
             && pixels
     }
 
+    /// How often a DAVIS was told to skip when it did not.
+    #[must_use]
+    pub fn skip_orders(&self) -> usize {
+        let skips = self.log.iter().filter_map(|transfer| match transfer {
+            Transfer::Write(register, value) if *register == Register::new(Module::Dvs, 51) => {
+                Some(*value != 0)
+            }
+            _ => None,
+        });
+        let mut skipped = false;
+        skips.filter(|skips| !core::mem::replace(&mut skipped, *skips) && *skips).count()
+    }
+
     /// What the registers say is left out.
     #[must_use]
     pub fn filters(&self) -> Filters {
@@ -378,13 +391,16 @@ impl Camera {
             let (x, y) = if self.swaps_xy() { (event.y, event.x) } else { (event.x, event.y) };
             !region.contains(x, y)
         });
-        let skipped = filters.skip_every.is_some_and(|every| {
-            self.since_skip = if self.since_skip >= every { 0 } else { self.since_skip + 1 };
-            self.since_skip == 0
-        });
+        // Of what is in the region every second event is skipped. That the region comes first is not documented; were it the other way
+        // round, chance would decide which are, and as many on average.
+        let skipped = !outside
+            && filters.skip_every.is_some_and(|every| {
+                self.since_skip = if self.since_skip >= every { 0 } else { self.since_skip + 1 };
+                self.since_skip == 0
+            });
         if outside || skipped {
             self.filtered += 1;
-            self.skipped += u64::from(!outside);
+            self.skipped += u64::from(skipped);
         } else if self.fifo.len() + 16 > FIFO_BYTES {
             self.dropped += 1;
         } else {
