@@ -12,11 +12,8 @@ use crate::math::{TAU, larger, sqrt};
 
 /// Symmetry periods in the window from which on places in the period get offsets of their own.
 const FOLDED_PERIODS: usize = 3;
-/// Length of the pieces of the window between which the wandering of the axis is judged: a hand trembles up to 12 Hz, and what a host
-/// shakes at 35 Hz and more is as good as even over them. A long window has so many, a short one no fewer than these.
-const DRIFT_PIECE_US: f32 = 25_000.0;
-const DRIFT_PIECES: usize = 12;
-const LEAST_PIECES: usize = 4;
+/// Blocks over which the wandering of the axis is judged.
+const DRIFT_BLOCKS: usize = 12;
 /// No rotor turns by this share of a cycle of its harmonic beyond an even turn from a block to the next: the path has slipped to another
 /// edge of the template. Blocks of the fewest events scatter by a tenth of a cycle.
 const SLIP_CYCLES: f32 = 0.4;
@@ -81,9 +78,7 @@ impl Pose {
     }
 
     fn drift_px_s(&self) -> f32 {
-        let blocks = self.path.blocks();
-        let long = crate::math::ceil(DRIFT_PIECE_US / self.path.step_us()) as usize;
-        let size = long.min(blocks / LEAST_PIECES).max(blocks.div_ceil(DRIFT_PIECES)).max(1);
+        let size = self.path.blocks().div_ceil(DRIFT_BLOCKS).max(1);
         let dt_s = size as f32 * self.path.step_us() * 1e-6;
         let mean = |knots: &[Knot]| {
             let n = knots.len() as f32;
