@@ -105,6 +105,7 @@ impl<'m> Store<'m> {
     }
 
     /// Forgets everything; the next segment starts at `start_us`. Returns how many events went that no window had measured.
+    // Not inlined: it is called in several places.
     #[inline(never)]
     pub fn restart(&mut self, start_us: u64, segment_us: u32) -> u64 {
         let unmeasured = (0..=self.closed).map(|index| self.forget(index)).sum();
