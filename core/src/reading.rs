@@ -276,10 +276,8 @@ pub struct Reading {
     pub window_us: u32,
     /// Events that arrived in the window.
     pub events: u64,
-    /// Of these, events left out on purpose, evenly: the store is smaller than the window.
+    /// Of these, events left out on purpose: the store is smaller than the window.
     pub thinned: u64,
-    /// Of these, events left out because they were alone, as noise is, where the store is smaller than the window.
-    pub noise: u64,
     /// Events that the sensor or the link reported lost in the window.
     pub lost: u64,
     /// The best status among the rotors, or why there is none.

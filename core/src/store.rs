@@ -10,7 +10,6 @@
 //! its memory is a reservoir thinned evenly (what a long baseline needs): every 2^s-th event, s growing as
 //! the reservoir fills. What is kept depends on the events and the capacity alone, never on when a task ran.
 
-mod company;
 mod even;
 mod event;
 mod gyro;
@@ -27,7 +26,6 @@ pub use roll::Roll;
 pub use window::{Account, Window};
 
 use crate::event::GyroSample;
-use company::Company;
 use open::Segment;
 
 /// Segments in a window.
@@ -69,9 +67,6 @@ pub struct Store<'m> {
     start_us: u64,
     segment_us: u32,
     thinned: u64,
-    noise: u64,
-    /// What tells the noise in the open segment.
-    company: Company,
     /// A gyro sample of a time behind the open segment.
     ahead: Option<GyroSample>,
     /// The camera's roll in all segments that went by, and in those given up behind the ones that are measured.
@@ -96,8 +91,6 @@ impl<'m> Store<'m> {
             start_us: 0,
             segment_us: segment_us.max(1),
             thinned: 0,
-            noise: 0,
-            company: Company::NONE,
             ahead: None,
             rolled: Roll::NONE,
             rolled_behind: Roll::NONE,
@@ -105,8 +98,6 @@ impl<'m> Store<'m> {
     }
 
     /// Forgets everything; the next segment starts at `start_us`. Returns how many events went that no window had measured.
-    // Not inlined: it is called in several places.
-    #[inline(never)]
     pub fn restart(&mut self, start_us: u64, segment_us: u32) -> u64 {
         let unmeasured = (0..=self.closed).map(|index| self.forget(index)).sum();
         self.segments = [Segment::default(); MOST_SEGMENTS];
@@ -116,16 +107,14 @@ impl<'m> Store<'m> {
         self.segment_us = segment_us.max(1);
         self.ahead = None;
         self.rolled_behind = Roll::NONE;
-        self.company.clear();
         unmeasured
     }
 
     /// What no window has measured of a segment that goes: that many events were not used, and none of them were thinned.
     #[inline(never)]
     fn forget(&mut self, index: usize) -> u64 {
-        let Segment { counted, noise, len, unmeasured, .. } = self.segments[self.slot(index)];
+        let Segment { counted, len, unmeasured, .. } = self.segments[self.slot(index)];
         if unmeasured > 0 {
-            self.noise = self.noise.saturating_sub(noise);
             self.thinned = self.thinned.saturating_sub(counted.saturating_sub(len as u64));
         }
         u64::from(unmeasured)
@@ -135,12 +124,6 @@ impl<'m> Store<'m> {
     #[must_use]
     pub const fn thinned(&self) -> u64 {
         self.thinned
-    }
-
-    /// Events left out as noise since the beginning, none of them among the thinned ones.
-    #[must_use]
-    pub const fn noise(&self) -> u64 {
-        self.noise
     }
 
     /// Length of one segment behind those that are held, in microseconds.
@@ -212,7 +195,6 @@ impl<'m> Store<'m> {
         self.closed += 1;
         let slot = self.slot(self.closed);
         self.segments[slot] = Segment::after(&before, self.capacity);
-        self.company.clear();
         self.settle();
     }
 

@@ -173,16 +173,10 @@ impl<'m> Tachometer<'m> {
         self.ignored
     }
 
-    /// Events left out on purpose, evenly, since the start: the store is smaller than the window.
+    /// Events left out on purpose since the start: the store is smaller than the window.
     #[must_use]
     pub const fn thinned(&self) -> u64 {
         self.store.thinned()
-    }
-
-    /// Events left out because they were alone, as noise is, since the start: where the store is smaller than the window.
-    #[must_use]
-    pub const fn noise(&self) -> u64 {
-        self.store.noise()
     }
 
     /// The heat map, for aiming.

@@ -12,10 +12,10 @@ pub struct Lines<'r>(pub &'r Reading);
 impl fmt::Display for Lines<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         // Taken apart without `..`: a new field does not compile until it stands in the line.
-        let Reading { t_us, window_us, events, thinned, noise, lost, status, rotors } = self.0;
+        let Reading { t_us, window_us, events, thinned, lost, status, rotors } = self.0;
         writeln!(
             f,
-            "reading t_us={t_us} window_us={window_us} events={events} thinned={thinned} noise={noise} lost={lost} status={}",
+            "reading t_us={t_us} window_us={window_us} events={events} thinned={thinned} lost={lost} status={}",
             StatusWord(*status)
         )?;
         rotors.iter().try_for_each(|rotor| write_rotor(f, rotor))

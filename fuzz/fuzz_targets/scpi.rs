@@ -35,7 +35,6 @@ fn reading(seed: u8) -> Reading {
         window_us: u32::MAX,
         events: u64::MAX,
         thinned: 0,
-        noise: 0,
         lost: u64::from(seed),
         status: Status::Locked,
         rotors,

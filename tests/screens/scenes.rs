@@ -272,7 +272,6 @@ fn reading(end_us: u64, status: Status, rotors: &[Rotor], relative_sigma: f32) -
         window_us: WINDOW_US,
         events: 63_000,
         thinned: 0,
-        noise: 0,
         lost: 0,
         status,
         rotors: rotors.collect(),

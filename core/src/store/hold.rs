@@ -46,11 +46,9 @@ impl Store<'_> {
             self.start_us = last_us;
             self.closed += 1;
         }
-        let scaled = |events: u64| events * u64::from(segment_us) / lasted_us.max(1);
-        let (counted, noise) = (scaled(before.counted), scaled(before.noise));
+        let counted = before.counted * u64::from(segment_us) / lasted_us.max(1);
         let slot = self.slot(self.closed);
-        self.segments[slot] = Segment::after(&Segment { counted, noise, ..before }, self.capacity);
-        self.company.clear();
+        self.segments[slot] = Segment::after(&Segment { counted, ..before }, self.capacity);
         self.segment_us = segment_us.max(1);
         self.settle();
         segments

@@ -65,10 +65,6 @@ impl Store<'_> {
                 if ((i - held) as u64 * old_us) / u64::from(segment_us) == nth {
                     merged.lost = merged.lost.saturating_add(segment.lost);
                     merged.unmeasured = merged.unmeasured.saturating_add(segment.unmeasured);
-                    merged.noise += segment.noise;
-                    // As the open one, which is the last, goes on.
-                    merged.is_crowded = segment.is_crowded;
-                    merged.is_noisy = segment.is_noisy;
                     merged.rates = merged.rates.and(segment.rates);
                 }
             }

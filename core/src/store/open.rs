@@ -17,10 +17,8 @@ const OCTAVES: u8 = 3;
 pub(super) struct Segment {
     /// Events kept.
     pub len: usize,
-    /// Events that came and were not left out as noise, each for as many as it stands for.
+    /// Events that came, each for as many as it stands for.
     pub counted: u64,
-    /// Those that were.
-    pub noise: u64,
     /// Events that were handed in and that no window has measured yet.
     pub unmeasured: u32,
     /// Events that were lost before.
@@ -33,9 +31,6 @@ pub(super) struct Segment {
     pub skip: u32,
     /// Most that an event stood for when it came, as a power of two.
     pub heaviest_log2: u8,
-    /// Whether more events are expected than are kept, and whether most of them are noise, as the burst told.
-    pub is_crowded: bool,
-    pub is_noisy: bool,
 }
 
 impl Segment {
@@ -45,13 +40,7 @@ impl Segment {
     pub fn after(before: &Self, capacity: usize) -> Self {
         let overfull = before.counted.checked_div(capacity as u64).unwrap_or(0);
         let stride_log2 = overfull.checked_ilog2().unwrap_or(0) as u8;
-        Self {
-            stride_log2: stride_log2.min(MOST_WEIGHT_LOG2),
-            is_crowded: before.counted + before.noise >= 2 * capacity as u64,
-            // Until its own burst tells.
-            is_noisy: before.is_noisy,
-            ..Self::default()
-        }
+        Self { stride_log2: stride_log2.min(MOST_WEIGHT_LOG2), ..Self::default() }
     }
 
     /// How many events the next that is kept stands for, as a power of two, and the place up to which that holds.
@@ -69,6 +58,8 @@ impl Segment {
 impl Store<'_> {
     /// Takes in events of the open segment, each of which stands for 2^`weight_log2`: the others were thinned before. `kept` hears
     /// of those that it keeps, and of how many each stands for then, as a power of two.
+    // A function of its own, so that all it needs stays in registers.
+    #[inline(never)]
     pub fn push(
         &mut self,
         events: &[PackedEvent],
@@ -76,45 +67,6 @@ impl Store<'_> {
         mut kept: impl FnMut(PackedEvent, u8),
     ) {
         let slot = self.slot(self.closed);
-        let segment = &mut self.segments[slot];
-        segment.unmeasured = segment.unmeasured.saturating_add(events.len() as u32);
-        let burst = as_they_came(self.capacity, 0);
-        let mut rest = events;
-        while !rest.is_empty() {
-            let &Segment { is_crowded, is_noisy, len, .. } = &self.segments[slot];
-            let in_burst = burst.saturating_sub(len);
-            if !is_crowded || (in_burst == 0 && !is_noisy) {
-                self.keep(slot, rest, weight_log2, &mut kept);
-                return;
-            }
-            if in_burst > 0 {
-                // Each of these is kept.
-                let (some, later) = rest.split_at(rest.len().min(in_burst));
-                self.keep(slot, some, weight_log2, &mut kept);
-                self.segments[slot].is_noisy = self.company.probe(some, is_noisy);
-                rest = later;
-                continue;
-            }
-            let moment = self.company.moment(rest);
-            rest = rest.get(moment.len()..).unwrap_or_default();
-            let found = self.company.found(moment);
-            self.keep(slot, &found, weight_log2, &mut kept);
-            let alone = ((moment.len() - found.len()) as u64) << weight_log2;
-            self.segments[slot].noise += alone;
-            self.noise += alone;
-        }
-    }
-
-    /// Keeps what there is room for of these events.
-    // A function of its own, so that all it needs stays in registers.
-    #[inline(never)]
-    fn keep(
-        &mut self,
-        slot: usize,
-        events: &[PackedEvent],
-        weight_log2: u8,
-        kept: &mut impl FnMut(PackedEvent, u8),
-    ) {
         let skip = self.segments[slot].skip;
         // What is to be passed over, in these events, and what is left of it that is less than one stands for.
         let (mut next, mut rest) = ((skip >> weight_log2) as usize, skip);
@@ -152,6 +104,7 @@ impl Store<'_> {
         segment.skip = (next.saturating_sub(events.len()) as u32) << weight_log2 | rest;
         let arrived = (events.len() as u64) << weight_log2;
         segment.counted += arrived;
+        segment.unmeasured = segment.unmeasured.saturating_add(events.len() as u32);
         self.thinned += arrived - count as u64;
     }
 

@@ -33,8 +33,7 @@ impl Store<'_> {
         let mut account = Account { rolled: self.rolled, ..Account::default() };
         for index in 0..segments.min(self.closed + 1) {
             let segment = &self.segments[self.slot(index)];
-            account.counted += segment.counted + segment.noise;
-            account.noise += segment.noise;
+            account.counted += segment.counted;
             account.kept += segment.len as u64;
             account.lost = account.lost.saturating_add(segment.lost);
             account.rates = account.rates.and(segment.rates);
@@ -51,8 +50,6 @@ pub struct Account {
     pub counted: u64,
     /// Stand in the store.
     pub kept: u64,
-    /// Left out as noise.
-    pub noise: u64,
     /// Reported lost by the sensor or the link.
     pub lost: u64,
     rates: Rates,

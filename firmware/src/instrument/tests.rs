@@ -38,7 +38,6 @@ fn reading(end_us: u64, status: Status, rotors: &[RotorReading]) -> Reading {
         window_us: WINDOW_US,
         events: 100_000,
         thinned: 0,
-        noise: 0,
         lost: 0,
         status,
         rotors: rotors.iter().cloned().collect(),

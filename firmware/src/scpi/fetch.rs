@@ -137,11 +137,11 @@ pub fn fetch(
         },
         Item::Events => match reading {
             Some(reading) => {
-                for count in [reading.events, reading.thinned, reading.lost, reading.noise] {
+                for count in [reading.events, reading.thinned, reading.lost] {
                     out.plain(count);
                 }
             }
-            None => (0..4).for_each(|_| out.number(None)),
+            None => (0..3).for_each(|_| out.number(None)),
         },
     }
     Ok(())

@@ -127,7 +127,6 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
         tachometer.finish();
         drain(tachometer, |reading| readings.push(reading));
         facts.thinned = tachometer.thinned();
-        facts.noise = tachometer.noise();
         tachometer.ignored()
     });
     bar.finish_and_clear();

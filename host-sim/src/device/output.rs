@@ -197,7 +197,7 @@ mod tests {
     use super::*;
 
     const TEXT: &str = "\
-reading t_us=5 window_us=10 events=3 thinned=0 noise=0 lost=0 status=locked
+reading t_us=5 window_us=10 events=3 thinned=0 lost=0 status=locked
 rotor id=0 x_px=3f800000
 spent push=7 poll=9
 push events=3 calls=1 ticks=7 longest=7

@@ -24,7 +24,7 @@ pub struct Document {
     pub duration_s: f64,
     /// Events in the file.
     pub events: u64,
-    /// Events left out on purpose: evenly, or because they were alone, as noise is.
+    /// Events left out on purpose.
     pub thinned: u64,
     /// Events that the sensor or the link lost.
     pub lost: u64,
@@ -97,10 +97,8 @@ pub struct FileFacts {
     pub last_us: u64,
     /// Events in the file.
     pub events: u64,
-    /// Events left out on purpose, evenly.
+    /// Events left out on purpose.
     pub thinned: u64,
-    /// Events left out because they were alone, as noise is.
-    pub noise: u64,
     /// Events lost.
     pub lost: u64,
 }
@@ -163,7 +161,7 @@ impl Document {
             height_px: facts.size_px.1,
             duration_s: facts.last_us.saturating_sub(facts.first_us) as f64 / 1e6,
             events: facts.events,
-            thinned: facts.thinned + facts.noise,
+            thinned: facts.thinned,
             lost: facts.lost,
             status: summary.status.as_str(),
             reason: reason(summary.status),

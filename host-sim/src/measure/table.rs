@@ -13,10 +13,9 @@ pub fn table(facts: &FileFacts, summary: &Summary, readings: &[Reading]) -> Stri
     let mut text = String::new();
     let seconds = facts.last_us.saturating_sub(facts.first_us) as f64 * 1e-6;
     let (width, height) = facts.size_px;
-    let noise = if facts.noise > 0 { format!("{} noise, ", facts.noise) } else { String::new() };
     let _ = writeln!(
         text,
-        "{}: {} {width}x{height}, {seconds:.3} s, {} events ({} thinned, {noise}{} lost), {} readings",
+        "{}: {} {width}x{height}, {seconds:.3} s, {} events ({} thinned, {} lost), {} readings",
         facts.file,
         facts.format,
         facts.events,

@@ -116,7 +116,6 @@ mod tests {
             window_us: 150_000,
             events: 1000,
             thinned: 0,
-            noise: 0,
             lost: 0,
             status: Status::Locked,
             rotors: rotors.iter().cloned().collect(),
