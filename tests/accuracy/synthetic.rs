@@ -4,6 +4,7 @@
 use evtach_core::{Direction, Event, Geometry, Polarity, Reason, Status};
 use evtach_host::measure::{Capacity, Summary};
 use evtach_host::synth::presets::Preset;
+use evtach_host::synth::scene::Shape;
 use evtach_host::synth::{Model, Rotor, Scene, generate};
 use evtach_tests::{Loaded, Truth, measure, pair, show};
 
@@ -186,4 +187,32 @@ fn positive_rpm_of_a_scene_is_clockwise() {
         let speed = summary.rotors[0].speed.expect("a speed");
         assert_eq!(speed.direction().as_str(), name);
     }
+}
+
+/// Blades that pass faster than the pixels recover keep step with part of their speed as well: that is never told.
+#[test]
+fn blades_faster_than_the_pixels_recover() {
+    let mut failures = Vec::new();
+    // Blades, rpm, shape, and the refractory period in blade periods.
+    let rotors = [
+        (6, 16_000.0, Shape::Straight, 0.7),
+        (6, 16_000.0, Shape::Straight, 1.1),
+        (4, 30_474.0, Shape::Tapered, 1.09),
+        (6, 21_392.0, Shape::Swept, 1.33),
+        (4, 19_788.0, Shape::Tapered, 2.06),
+        (5, 13_064.0, Shape::Straight, 2.48),
+        (4, 32_639.0, Shape::Tapered, 2.46),
+        (2, 50_563.0, Shape::Straight, 2.02),
+    ];
+    for (blades, rpm, shape, recovery) in rotors {
+        let rotor = Rotor { blades, rpm, shape, radius_px: 30.0, ..Rotor::default() };
+        let mut scene = one(rotor, Model::Threshold, 40);
+        scene.sensor.refractory_us = recovery * 60e6 / (rpm * f64::from(blades));
+        let name = format!("{shape:?}, {recovery} of a period");
+        // Only where they do recover is a speed owed.
+        let owed = recovery < 1.0;
+        let told = |failure: &String| owed || !failure.ends_with("no speed");
+        failures.extend(wrong(&name, &scene).into_iter().filter(told));
+    }
+    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
 }

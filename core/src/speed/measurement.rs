@@ -3,6 +3,7 @@
 mod baselines;
 mod coarse;
 mod doubt;
+mod recovery;
 mod verdict;
 
 use super::angular::AngularSums;
@@ -48,6 +49,7 @@ enum Stage {
     Doubt,
     Symmetry,
     Overtone,
+    Recovery,
     Pose,
     Initial,
     Refinement,
@@ -180,6 +182,7 @@ impl Measurement {
             Stage::Doubt => self.doubt(window, polar, angular, even),
             Stage::Symmetry => self.symmetry(stated, polar, angular),
             Stage::Overtone => self.overtone(polar),
+            Stage::Recovery => self.recovery(window, polar),
             Stage::Pose => self.pose(window, sums, even),
             Stage::Initial => self.initial(window, icp),
             Stage::Refinement => self.refinement(window, icp),
@@ -202,6 +205,7 @@ impl Measurement {
             Stage::Track | Stage::Newton => "centre",
             Stage::Scan | Stage::Doubt => "scan",
             Stage::Symmetry | Stage::Overtone => "symmetry",
+            Stage::Recovery => "recovery",
             Stage::Pose => "pose",
             Stage::Initial => "initial",
             Stage::Refinement => "refinement",

@@ -158,8 +158,11 @@ impl Tachometer<'_> {
     /// conclude, in a step of its own.
     fn measure_next(&mut self, index: usize) {
         let taken = |disc: &Disc| {
-            let measured = |o: &&Outcome| o.status.reason().is_none();
-            self.outcomes.iter().filter(measured).any(|o| o.found.disc.overlaps(disc))
+            // Nor is a part of a rotor that is too fast a rotor.
+            let stands = |o: &&Outcome| {
+                o.status.reason().is_none() || o.status == Status::Refused(Reason::TooFast)
+            };
+            self.outcomes.iter().filter(stands).any(|o| o.found.disc.overlaps(disc))
         };
         let next = (index..self.candidates.len()).find(|i| !taken(&self.candidates[*i].found.disc));
         let Some(next) = next else {

@@ -161,20 +161,23 @@ impl Measurement {
 
     /// Whether the line is an overtone of the blades' own.
     pub(super) fn overtone(&mut self, polar: &[PolarEvent]) {
+        let at =
+            |harmonic| Pattern::learn(polar, self.disc, self.omega_rad_s, harmonic).coherence();
+        let mut share = at(self.harmonic);
         if let Some(parts) = self.parts.map(u32::from).filter(|parts| *parts > 0) {
-            let at =
-                |harmonic| Pattern::learn(polar, self.disc, self.omega_rad_s, harmonic).coherence();
-            if at(parts) > at(self.harmonic) {
-                self.harmonic = parts;
+            let of_parts = at(parts);
+            if of_parts > share {
+                (self.harmonic, share) = (parts, of_parts);
             }
         }
+        self.evidence.coherence = Some(share);
         let rpm = self.omega_rad_s.abs() * Speed::RPM_PER_RAD_S;
         let blades = f32::from(self.parts.unwrap_or(1));
         if rpm > MOST_RPM || rpm * blades > MOST_BLADE_RPM {
             return self.refuse(Reason::TooFast);
         }
         self.turn = 0;
-        self.stage = Stage::Pose;
+        self.stage = Stage::Recovery;
     }
 
     /// Initial alignment in every other segment: second coarse witness.

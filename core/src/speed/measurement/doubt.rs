@@ -17,7 +17,7 @@ const DOUBTFUL: f32 = 0.3;
 /// The same where a centre that is off by little leads to another harmonic, which then shows as well.
 const SMALL_DOUBTFUL: f32 = 0.15;
 /// The same after the look about the centre, from which on nothing but edges tells them apart.
-const IN_DOUBT: f32 = 0.5;
+const IN_DOUBT: f32 = 0.6;
 /// The same of another harmonic at its own best place, from which on not even edges do.
 const MOST_RIVAL: f32 = 0.9;
 /// Radius in pixels below which a centre that is off by two or three pixels fits the overtone as well.
