@@ -31,6 +31,22 @@ pub struct Args {
     /// Only this event model.
     #[arg(long, value_enum)]
     model: Option<Model>,
+    /// Only these evaluations: all of them take hours.
+    #[arg(long, value_enum)]
+    only: Vec<Evaluation>,
+}
+
+/// What is varied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Evaluation {
+    /// Speeds, before a fixed and a handheld camera and on a vibrating host.
+    Speeds,
+    /// Distances, before a fixed and a handheld camera.
+    Distances,
+    /// Blade counts.
+    Blades,
+    /// A drone's four rotors.
+    Drone,
 }
 
 /// One recording to be made and measured.
@@ -47,7 +63,7 @@ pub fn run(args: &Args) -> anyhow::Result<Report> {
     let first = spec::first_seed(args.common.tuning);
     let models: Vec<Model> =
         spec::MODELS.into_iter().filter(|m| args.model.is_none_or(|a| a == *m)).collect();
-    let places = places(quick);
+    let places = places(quick, &args.only);
     let jobs: Vec<Job> = (first..first + seeds)
         .flat_map(|seed| models.iter().map(move |model| (seed, *model)))
         .flat_map(|(seed, model)| {
@@ -73,8 +89,10 @@ pub fn run(args: &Args) -> anyhow::Result<Report> {
     })
 }
 
-/// The conditions of all tables, each once.
-fn places(quick: bool) -> Vec<Place> {
+/// The conditions of the tables that are wanted, or else of all, each once.
+fn places(quick: bool, only: &[Evaluation]) -> Vec<Place> {
+    let wanted = |evaluation| only.is_empty() && !quick || only.contains(&evaluation);
+    let shown = |evaluation| only.is_empty() || only.contains(&evaluation);
     let one = |rpm, blades, distance_cm: f64, mount| Place::One {
         rpm: rpm as u32,
         blades,
@@ -85,20 +103,26 @@ fn places(quick: bool) -> Vec<Place> {
     let mut places = Vec::new();
     for &rpm in speeds {
         for mount in [Mount::Fixed, Mount::Handheld, Mount::Vibrating] {
-            places.push(one(rpm, 3, 40.0, mount));
-        }
-        if quick {
-            continue;
+            if shown(Evaluation::Speeds) {
+                places.push(one(rpm, 3, 40.0, mount));
+            }
         }
         for distance_cm in spec::DISTANCES_CM {
-            places.push(one(rpm, 3, distance_cm, Mount::Fixed));
-            places.push(one(rpm, 3, distance_cm, Mount::Handheld));
+            for mount in [Mount::Fixed, Mount::Handheld] {
+                if wanted(Evaluation::Distances) {
+                    places.push(one(rpm, 3, distance_cm, mount));
+                }
+            }
         }
         for blades in spec::BLADES {
-            places.push(one(rpm, blades, 40.0, Mount::Fixed));
+            if wanted(Evaluation::Blades) {
+                places.push(one(rpm, blades, 40.0, Mount::Fixed));
+            }
         }
     }
-    places.push(Place::Quad);
+    if shown(Evaluation::Drone) {
+        places.push(Place::Quad);
+    }
     places.sort_unstable();
     places.dedup();
     places

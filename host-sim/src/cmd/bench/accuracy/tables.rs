@@ -58,15 +58,17 @@ struct View<'a> {
 
 impl View<'_> {
     fn tables(&self) -> Vec<Table> {
-        let mut tables = vec![
-            self.table("fixed camera", &STAGES, &self.speeds(Mount::Fixed)),
-            self.table(
-                "handheld, before a textured wall",
-                &HANDHELD,
-                &self.speeds(Mount::Handheld),
-            ),
-            self.table("vibrating host", &STAGES, &self.speeds(Mount::Vibrating)),
-        ];
+        let mut tables = Vec::new();
+        for (mount, title, columns) in [
+            (Mount::Fixed, "fixed camera", &STAGES[..]),
+            (Mount::Handheld, "handheld, before a textured wall", &HANDHELD),
+            (Mount::Vibrating, "vibrating host", &STAGES),
+        ] {
+            let rows = self.speeds(mount);
+            if rows.iter().all(|(_, places)| !places.is_empty()) {
+                tables.push(self.table(title, columns, &rows));
+            }
+        }
         let distances: Vec<u32> = DISTANCES_CM.iter().map(|d| *d as u32).collect();
         for mount in [Mount::Fixed, Mount::Handheld] {
             let row = |cm: &u32| (format!("{cm} cm"), self.averaged(mount, 3, *cm));
@@ -82,7 +84,10 @@ impl View<'_> {
         if rows.iter().all(|(_, places)| !places.is_empty()) {
             tables.push(self.table("blades, fixed, mean over the speeds", &STAGES, &rows));
         }
-        tables.push(self.table("four rotors", &STAGES, &[("drone".to_owned(), vec![Place::Quad])]));
+        if self.cells.places().contains(&Place::Quad) {
+            let drone = ("drone".to_owned(), vec![Place::Quad]);
+            tables.push(self.table("four rotors", &STAGES, &[drone]));
+        }
         tables
     }
 
