@@ -24,7 +24,7 @@ pub enum Reason {
     Saturated,
     /// The rotor turns, but not far enough within the longest window.
     TooSlow,
-    /// Blade passages come faster than the method resolves.
+    /// Blade passages come faster than the method resolves, or than the pixels recover.
     TooFast,
     /// The window is not full yet.
     Searching,

@@ -36,7 +36,7 @@ const SLOWEST_HZ: f32 = 200.0;
 const LEAST_PERIODS: f32 = 24.0;
 
 impl Measurement {
-    /// Asks whether the pattern keeps step with another speed too, one a step. Cost: about 75 instructions an event and step.
+    /// Asks whether the pattern keeps step with another speed too, one a step. Cost: about 150 instructions an event and step.
     pub(super) fn recovery(&mut self, window: &Window<'_>, polar: &[PolarEvent]) {
         let line_hz = self.omega_rad_s.abs() * self.harmonic as f32 / TAU;
         let periods = line_hz * window.duration_us as f32 * 1e-6;
