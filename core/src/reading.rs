@@ -78,7 +78,7 @@ impl Reason {
             Self::Ambiguous => "hold still, fill the view with one rotor, or give the blade count",
             Self::Saturated => "too many events: narrow the view or dim the light",
             Self::TooSlow => "the rotor turns too slowly for the window",
-            Self::TooFast => "the blades pass too fast for this method, or for the camera's pixels",
+            Self::TooFast => "the blades pass too fast to be followed",
             Self::Searching => "hold still until the window is full",
             Self::Fault => "restart the device",
         }
