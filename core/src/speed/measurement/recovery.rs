@@ -27,7 +27,7 @@ const HIGHER: [f32; 11] = [
 ];
 const LOWER: [f32; 4] = [1.0 / 3.0, 1.0 / 2.0, 3.0 / 5.0, 2.0 / 3.0];
 /// Share in step with another speed over that with the one at hand from which on either may be the rotor's. With a higher one
-/// rigid rotors of random scenes reach 0.30, mistaken speeds 0.34 and more.
+/// rigid rotors of two blades or more reach 0.30 in random scenes, mistaken speeds 0.34 and more.
 const MOST_HIGHER: f32 = 0.32;
 const MOST_LOWER: f32 = 1.1;
 /// Frequency of the harmonic in Hz below which no pixel takes so long to recover.
@@ -40,7 +40,7 @@ impl Measurement {
     pub(super) fn recovery(&mut self, window: &Window<'_>, polar: &[PolarEvent]) {
         let line_hz = self.omega_rad_s.abs() * self.harmonic as f32 / TAU;
         let periods = line_hz * window.duration_us as f32 * 1e-6;
-        // The fastest shaft's single mark passes once in a millisecond.
+        // The fastest shaft's single mark passes once in a millisecond, and hardly a pixel takes longer.
         let asked = line_hz > SLOWEST_HZ && periods > LEAST_PERIODS && self.parts != Some(1);
         let speeds =
             HIGHER.map(|s| (s, MOST_HIGHER)).into_iter().chain(LOWER.map(|s| (s, MOST_LOWER)));
