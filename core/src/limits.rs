@@ -42,7 +42,7 @@ pub const GRID_CELLS_SIDE: usize = 24;
 pub const MAX_BLADES: u8 = 8;
 
 /// Slice pairs at one baseline.
-pub const MAX_PAIRS: usize = 64;
+pub const MAX_PAIRS: usize = 128;
 
 /// Rotors by every line before the choice: 20 x 32 B.
 pub const MAX_CANDIDATES: usize = 20;

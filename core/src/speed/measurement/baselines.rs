@@ -9,7 +9,7 @@ use crate::registration::Icp;
 use crate::store::Window;
 
 /// Slice pairs: refinement, lock, fractional-baseline test.
-pub(super) const REFINEMENT: Effort = Effort { pairs: 12, points: SLICE_POINTS, settled: 0.1 };
+const REFINEMENT: Effort = Effort { pairs: 12, points: SLICE_POINTS, settled: 0.1 };
 /// The paper's further refinement, kept to show what it gains.
 const FURTHER: Effort = Effort { pairs: 6, ..REFINEMENT };
 const LOCK: Effort = Effort { pairs: 8, settled: 0.2, ..REFINEMENT };
@@ -22,8 +22,10 @@ const FRACTIONAL: Effort = Effort { pairs: 3, ..LOCK };
 const FRACTIONAL_AGAIN: Effort = Effort { pairs: 9, ..LOCK };
 /// The lock of a rotor that is followed: the phase tells its speed, and these bear it out.
 const FOLLOWING: Effort = Effort { pairs: 3, points: SLICE_POINTS / 2, ..LOCK };
-/// Where there are more events than this for each pair, more pairs are registered, up to [`MAX_PAIRS`].
+/// Where there are more events than this for each pair, more pairs are registered, up to [`crate::limits::MAX_PAIRS`].
 const PAIR_EVENTS: usize = 1_536;
+/// The same of the refinement, whose pairs are short and gain by overlapping.
+const REFINEMENT_EVENTS: usize = SLICE_POINTS;
 /// Step of the refinement in symmetry periods (paper: eta x half an angle of symmetry, eta = 0.8).
 pub(super) const REFINEMENT_PERIODS: f32 = 0.4;
 /// Standard errors of the refinement by which it contradicts a harmonic in doubt.
@@ -54,9 +56,15 @@ impl Measurement {
         self.pairs = Some(plan);
     }
 
-    /// As many pairs as so many events are worth.
-    pub(super) fn worth(&self, least: Effort) -> Effort {
-        Effort { pairs: least.pairs.max((self.events / PAIR_EVENTS) as u32), ..least }
+    /// As many pairs as the events are worth, so many of them for each.
+    fn worth(&self, least: Effort, pair_events: usize) -> Effort {
+        Effort { pairs: least.pairs.max((self.events / pair_events) as u32), ..least }
+    }
+
+    /// Plans the refinement.
+    pub(super) fn plan_refinement(&mut self, window: &Window<'_>) {
+        self.plan(window, REFINEMENT_PERIODS, self.worth(REFINEMENT, REFINEMENT_EVENTS));
+        self.stage = Stage::Refinement;
     }
 
     /// Advances the planned pairs; the finished set once all are registered.
@@ -68,7 +76,7 @@ impl Measurement {
     /// The paper's refinement: step extended to 0.8 of half an angle of symmetry.
     pub(super) fn refinement(&mut self, window: &Window<'_>, icp: &mut Icp) {
         let Some(pairs) = self.advance(window, icp) else { return };
-        let Some(refined) = pairs.median() else {
+        let Some(refined) = pairs.middle() else {
             self.stage = Stage::Verdict;
             return;
         };
@@ -81,7 +89,7 @@ impl Measurement {
             self.stage = Stage::Verdict;
             return;
         }
-        self.plan(window, REFINEMENT_PERIODS, self.worth(FURTHER));
+        self.plan(window, REFINEMENT_PERIODS, self.worth(FURTHER, PAIR_EVENTS));
         if let Some(pairs) = &mut self.pairs {
             pairs.retarget(refined.omega_rad_s);
         }
@@ -101,7 +109,7 @@ impl Measurement {
     /// The paper's further refinement, kept to show what it gains.
     pub(super) fn further(&mut self, window: &Window<'_>, icp: &mut Icp) {
         let Some(pairs) = self.advance(window, icp) else { return };
-        let found = pairs.median();
+        let found = pairs.middle();
         self.evidence.further_rad_s = found.map(|found| found.omega_rad_s);
         let sigma = found.map_or(f32::MAX, |found| {
             found.sigma_rad_s.max((found.omega_rad_s - self.omega_rad_s).abs())
@@ -130,7 +138,7 @@ impl Measurement {
         } else if longest > MORE * m {
             ON_THE_WAY
         } else {
-            self.worth(LOCK)
+            self.worth(LOCK, PAIR_EVENTS)
         };
         self.plan(window, m, effort);
     }

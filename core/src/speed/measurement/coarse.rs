@@ -1,7 +1,7 @@
 //! What is known of a rotor before its pose is followed: centre and speed by the polar phase, the harmonic that keeps step (first
 //! coarse witness), the angle of symmetry; and after, the initial alignment (second coarse witness).
 
-use super::baselines::{REFINEMENT, REFINEMENT_PERIODS};
+use super::baselines::REFINEMENT_PERIODS;
 use super::doubt::Doubt;
 use super::{LEAST_EVENTS, Measurement, Stage, Stated};
 use crate::math::TAU;
@@ -223,7 +223,6 @@ impl Measurement {
             self.stage = Stage::Verdict;
             return;
         }
-        self.plan(window, REFINEMENT_PERIODS, self.worth(REFINEMENT));
-        self.stage = Stage::Refinement;
+        self.plan_refinement(window);
     }
 }
