@@ -203,12 +203,17 @@ fn blades_faster_than_the_pixels_recover() {
         (5, 13_064.0, Shape::Straight, 2.48),
         (4, 32_639.0, Shape::Tapered, 2.46),
         (2, 50_563.0, Shape::Straight, 2.02),
+        (1, 29_780.0, Shape::Straight, 0.5),
+        (1, 29_780.0, Shape::Straight, 1.58),
+        (1, 39_322.0, Shape::Straight, 2.69),
+        (1, 56_895.0, Shape::Straight, 2.33),
+        (1, 25_956.0, Shape::Straight, 2.96),
     ];
     for (blades, rpm, shape, recovery) in rotors {
         let rotor = Rotor { blades, rpm, shape, radius_px: 30.0, ..Rotor::default() };
         let mut scene = one(rotor, Model::Threshold, 40);
         scene.sensor.refractory_us = recovery * 60e6 / (rpm * f64::from(blades));
-        let name = format!("{shape:?}, {recovery} of a period");
+        let name = format!("{blades} {shape:?}, {recovery} of a period");
         // Only where they do recover is a speed owed.
         let owed = recovery < 1.0;
         let told = |failure: &String| owed || !failure.ends_with("no speed");

@@ -30,20 +30,27 @@ const LOWER: [f32; 4] = [1.0 / 3.0, 1.0 / 2.0, 3.0 / 5.0, 2.0 / 3.0];
 /// rigid rotors of two blades or more reach 0.30 in random scenes, mistaken speeds 0.34 and more.
 const MOST_HIGHER: f32 = 0.32;
 const MOST_LOWER: f32 = 1.1;
-/// Frequency of the harmonic in Hz below which no pixel takes so long to recover.
+/// The same with twice or thrice the speed where the parts differ or there is but one, which about an axis that is not found
+/// exactly does not turn evenly: rigid ones reach 0.36, mistaken speeds 0.43 and more.
+const MOST_UNEVEN: f32 = 0.4;
+/// Frequency of the harmonic in Hz below which no pixel takes so long to recover. A single mark's is asked lower: where half its speed
+/// is told, nothing else speaks against that.
 const SLOWEST_HZ: f32 = 200.0;
+const SLOWEST_MARK_HZ: f32 = 100.0;
 /// Its periods in the window from which on speeds a seventh apart are told apart.
-const LEAST_PERIODS: f32 = 24.0;
+const LEAST_PERIODS: f32 = 14.0;
 
 impl Measurement {
     /// Asks whether the pattern keeps step with another speed too, one a step. Cost: about 150 instructions an event and step.
     pub(super) fn recovery(&mut self, window: &Window<'_>, polar: &[PolarEvent]) {
         let line_hz = self.omega_rad_s.abs() * self.harmonic as f32 / TAU;
         let periods = line_hz * window.duration_us as f32 * 1e-6;
-        // The fastest shaft's single mark passes once in a millisecond, and hardly a pixel takes longer.
-        let asked = line_hz > SLOWEST_HZ && periods > LEAST_PERIODS && self.parts != Some(1);
-        let speeds =
-            HIGHER.map(|s| (s, MOST_HIGHER)).into_iter().chain(LOWER.map(|s| (s, MOST_LOWER)));
+        let mark = self.parts == Some(1);
+        let slowest_hz = if mark { SLOWEST_MARK_HZ } else { SLOWEST_HZ };
+        let asked = line_hz > slowest_hz && periods > LEAST_PERIODS;
+        let uneven = mark || !self.alike;
+        let higher = |s| (s, if uneven && s >= 2.0 { MOST_UNEVEN } else { MOST_HIGHER });
+        let speeds = HIGHER.map(higher).into_iter().chain(LOWER.map(|s| (s, MOST_LOWER)));
         let Some((speed, most)) = speeds.filter(|_| asked).nth(usize::from(self.turn)) else {
             self.turn = 0;
             self.stage = Stage::Pose;
