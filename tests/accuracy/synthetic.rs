@@ -1,10 +1,10 @@
 //! Synthetic recordings with known truth, small enough to run everywhere.
 #![allow(clippy::panic)] // A test fails by it.
 
-use evtach_core::{Direction, Event, Geometry, Polarity, Reason, Status};
+use evtach_core::{Direction, Event, Geometry, Polarity, Reading, Reason, Status};
 use evtach_host::measure::{Capacity, Summary};
-use evtach_host::synth::presets::Preset;
-use evtach_host::synth::scene::Shape;
+use evtach_host::synth::presets::{self, Preset};
+use evtach_host::synth::scene::{Camera, Shape};
 use evtach_host::synth::{Model, Rotor, Scene, generate};
 use evtach_tests::{Loaded, Truth, measure, pair, show};
 
@@ -218,6 +218,39 @@ fn blades_faster_than_the_pixels_recover() {
         let owed = recovery < 1.0;
         let told = |failure: &String| owed || !failure.ends_with("no speed");
         failures.extend(wrong(&name, &scene).into_iter().filter(told));
+    }
+    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
+}
+
+/// Every reading of a series from the hand, not the mean over it alone. The hand shifts the image and does not roll it, so that the
+/// speed relative to the camera is known exactly.
+#[test]
+fn every_reading_of_a_series_from_the_hand() {
+    const RPM: f64 = 600.0;
+    const LARGEST_SHARE: f64 = 1e-3;
+    let mut failures = Vec::new();
+    for seed in [0, 13, 51, 57, 129, 134] {
+        let rotor = Rotor { blades: 3, rpm: RPM, radius_px: 50.0, ..Rotor::default() };
+        let scene = Scene {
+            camera: Camera { tremor_mrad: 0.0, ..presets::hand() },
+            background: presets::wall(),
+            duration_ms: 420.0,
+            ..one(rotor, Model::Threshold, seed)
+        };
+        let made = generate(&scene).expect("a scene in range");
+        let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
+        let (readings, _) = measure(&Loaded { geometry, events: made.events }, Capacity::Full);
+        let off = |reading: &Reading| {
+            let speed = reading.rotors.first()?.speed?;
+            Some(f64::from(speed.rpm()) / RPM - 1.0)
+        };
+        let off: Vec<f64> = readings.iter().filter_map(off).collect();
+        assert!(off.len() >= 3, "{} readings", off.len());
+        let most = off.iter().fold(0.0_f64, |most, off| most.max(off.abs()));
+        show(&format!("hand, seed {seed}: {} readings, {:.0} ppm at most", off.len(), most * 1e6));
+        if most > LARGEST_SHARE {
+            failures.push(format!("seed {seed}: {:.0} ppm off", most * 1e6));
+        }
     }
     assert!(failures.is_empty(), "\n{}", failures.join("\n"));
 }

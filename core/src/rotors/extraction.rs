@@ -58,6 +58,8 @@ pub struct Found {
     pub explained: f32,
     /// How it is tilted, once that was asked.
     pub tilt: Option<Tilt>,
+    /// Root mean square speed of its axis in px/s, once it was followed: 0 on a tripod, tens in the hand.
+    pub drift_px_s: f32,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -11,6 +11,7 @@ use super::baseline::{Estimate, Pairs};
 use super::initial::{Ladder, Rates};
 use super::polar::{PolarTrack, track};
 use super::pose::{Pose, Sums, Tilt};
+use super::statistics::root_mean_square;
 use crate::math::TAU;
 use crate::reading::{Evidence, Frame, Reason, Speed, Status};
 use crate::registration::Icp;
@@ -24,6 +25,9 @@ const ACCELERATION_SIGMAS: f32 = 4.0;
 const TILTED_PARTS: u8 = 3;
 /// Relative error of the speed of a rotor that is followed from window to window.
 const FOLLOWING_SIGMA: f32 = 1e-3;
+/// Root mean square speed of the axis in px/s from which on the camera moves: a hand makes some 80, and what few events scatter by
+/// looks like 20.
+const MOVING_PX_S: f32 = 25.0;
 /// Fewest events of a rotor that are measured.
 const LEAST_EVENTS: usize = 300;
 /// Symmetry periods and revolutions that a lock needs in the window.
@@ -147,7 +151,7 @@ impl Measurement {
             status: Status::Refused(Reason::Searching),
             lock_baseline_s: 0.0,
             alpha_rad_s2: None,
-            drift_px_s: 0.0,
+            drift_px_s: found.drift_px_s,
             roll_sigma_rad_s: 0.0,
             wanted_us: 0.0,
             evidence: Evidence::default(),
@@ -242,6 +246,11 @@ impl Measurement {
         periods
     }
 
+    /// Whether the axis moves in the picture, as far as was seen.
+    fn moves(&self) -> bool {
+        self.drift_px_s > MOVING_PX_S
+    }
+
     /// Follows the rotor's pose through the window, a round at a time: second witness of the lock.
     fn pose(&mut self, window: &Window<'_>, sums: &mut Sums, even: &mut Even) {
         if self.turn == 0 {
@@ -253,7 +262,7 @@ impl Measurement {
             let tells = self.parts.is_some_and(|parts| parts >= TILTED_PARTS) && !self.doubted();
             let known = self.follows && (self.tilt.is_some() || !tells);
             let pose = if tells { pose.tilted(self.tilt.unwrap_or_default()) } else { pose };
-            self.pose = if known { pose.known() } else { pose };
+            self.pose = if known { pose.known(self.moves()) } else { pose };
         }
         if !self.pose.step(window, sums, even) {
             return;
@@ -268,7 +277,9 @@ impl Measurement {
         if let Some(found) = self.pose.slope() {
             self.evidence.phase_rad_s = Some(found.speed.omega_rad_s);
             self.evidence.phase_sigma_rad_s = Some(found.speed.sigma_rad_s);
-            self.drift_px_s = found.drift_px_s;
+            // A hand that holds still for a window trembles in the next.
+            let before_px_s = if self.follows { self.drift_px_s } else { found.drift_px_s };
+            self.drift_px_s = root_mean_square(before_px_s, found.drift_px_s);
             self.evidence.sharpness_px = Some(self.pose.sharpness_px());
             if found.alpha_rad_s2.abs() > ACCELERATION_SIGMAS * found.alpha_sigma_rad_s2 {
                 self.alpha_rad_s2 = Some(found.alpha_rad_s2);
@@ -306,14 +317,17 @@ impl Measurement {
             found: Found {
                 disc: Disc { x_px, y_px, ..self.disc },
                 omega_rad_s: self.omega_rad_s,
-                // Low enough that what a hand moves between windows does not lead astray.
-                windings: if self.alike {
-                    self.harmonic.max(self.pose.harmonic() / 4)
-                } else {
+                // Low enough that what a hand moves in a window does not lead astray.
+                windings: if !self.alike {
                     self.harmonic
+                } else if self.moves() {
+                    self.parts.map_or(self.harmonic, u32::from)
+                } else {
+                    self.harmonic.max(self.pose.harmonic() / 4)
                 },
                 line_hz: self.line_hz,
                 tilt: self.pose.tilt(),
+                drift_px_s: self.drift_px_s,
                 ..Found::default()
             },
             parts: self.parts,

@@ -155,10 +155,11 @@ impl Pose {
         }
     }
 
-    /// The same for a rotor whose place and speed are known from the window before: fewer rounds will do.
+    /// The same for a rotor whose place and speed are known from the window before, in which it `moved` or not: fewer rounds
+    /// will do.
     #[must_use]
-    pub const fn known(mut self) -> Self {
-        self.schedule = Schedule::KNOWN;
+    pub const fn known(mut self, moved: bool) -> Self {
+        self.schedule = if moved { Schedule::MOVED } else { Schedule::KNOWN };
         self
     }
 
@@ -257,8 +258,8 @@ impl Pose {
         self.slope.as_ref()
     }
 
-    /// Weighs one more segment of the window, or looks at it, and where that ends a round corrects the path and learns the
-    /// template anew; `true` once all rounds are done. Cost: about 180 instructions an event.
+    /// Weighs one more segment of the window, or looks at it, or ends a round: corrects the path and learns the template anew;
+    /// `true` once all rounds are done. Cost: about 180 instructions an event, or half a million.
     pub fn step(&mut self, window: &Window<'_>, sums: &mut Sums, even: &mut Even) -> bool {
         if !self.started {
             // The axis is thought to be at rest yet.
@@ -275,9 +276,9 @@ impl Pose {
         if self.segment == 0 {
             *sums = Sums::EMPTY;
         }
-        self.look(window, sums);
-        self.segment += 1;
         if self.segment < window.segments() {
+            self.look(window, sums);
+            self.segment += 1;
             return false;
         }
         self.segment = 0;

@@ -16,6 +16,12 @@ pub fn mean_and_error(values: &[f32]) -> Option<(f32, f32)> {
     Some((mean, sqrt(squares / (n - 1.0) / n)))
 }
 
+/// Root mean square of two values.
+#[must_use]
+pub fn root_mean_square(a: f32, b: f32) -> f32 {
+    sqrt(0.5 * (a * a + b * b))
+}
+
 /// 97.5 % point of Student's t over that of the normal distribution, so that +/- 1.96 sigma covers 95 %
 /// although sigma itself was estimated from few values.
 #[must_use]

@@ -43,6 +43,8 @@ impl Schedule {
         Self { phase: Phase::First, round: 0, most: [3, 1, 6, 3], first_events: 3_072, share: 1 };
     /// For a rotor that was followed in the window before: a third of the events tell it as well.
     pub const KNOWN: Self = Self { most: [1, 0, 2, 1], first_events: 1_280, share: 3, ..Self::NEW };
+    /// The same for one that a hand moved meanwhile, which is known by its parts alone.
+    pub const MOVED: Self = Self { most: [1, 1, 4, 1], ..Self::KNOWN };
 
     /// The phase that the next round belongs to.
     pub const fn phase(&self) -> Phase {
