@@ -59,6 +59,10 @@ const MOST_SHORT_SIGMA: f32 = 0.012;
 /// What a hand shakes, in pixels, and blocks of a turn from which on a single mark's axis is told from the mark.
 const SHAKE_PX: f32 = 3.0;
 const MARK_BLOCKS: usize = 4;
+/// What a hand sways at a frequency near the turn's, in pixels, and the speed in rad/s up to which it does: 15 Hz. Of a single mark, that
+/// looks like a turn that is not even, however closely it is followed.
+const SWAY_PX: f32 = 1.5;
+const SWAYING_RAD_S: f32 = 15.0 * TAU;
 /// What shadows, flicker and folded slices may bias a registration by, in radians: a fifth of a pixel half-way to the rim.
 const BIAS_RAD: f32 = 5e-3;
 /// Standard deviation of the error by a busy readout, as a share of how far its queue may stretch the window.
@@ -132,7 +136,10 @@ impl Measurement {
         self.alpha_rad_s2 = self.alpha_rad_s2.filter(|alpha| alpha.abs() > by_hand);
         match self.status {
             Status::Coarse => self.widen_coarse(window, held_up / QUEUE_SIGMA, roll),
-            Status::Locked if self.pose.in_period() < MARK_BLOCKS => self.widen_mark(),
+            Status::Locked if self.pose.in_period() < MARK_BLOCKS => self.widen_mark(SHAKE_PX),
+            Status::Locked if roll > 0.0 && self.estimate.omega_rad_s.abs() < SWAYING_RAD_S => {
+                self.widen_mark(SWAY_PX);
+            }
             _ => {}
         }
         let own = self.estimate.sigma_rad_s;
@@ -224,12 +231,12 @@ impl Measurement {
         Estimate { sigma_rad_s: sqrt(own * own + bias * bias), ..lock }
     }
 
-    /// The reading of a single mark is as good as its axis holds still, where it is not followed around the turn: what the mark does
-    /// and what the camera does look alike.
-    fn widen_mark(&mut self) {
+    /// The reading of a single mark is as good as its axis holds still: what the mark does and what the camera does look alike, where it
+    /// is not followed around the turn, or a hand sways as fast as it turns.
+    fn widen_mark(&mut self, shake_px: f32) {
         if self.parts == Some(1) || self.parts == Some(2) && !self.alike {
             let turn_rad = self.evidence.periods.unwrap_or(0.0) * TAU;
-            let shake = SHAKE_PX / (self.disc.radius_px * turn_rad) * self.omega_rad_s;
+            let shake = shake_px / (self.disc.radius_px * turn_rad) * self.omega_rad_s;
             let own = self.estimate.sigma_rad_s;
             self.estimate.sigma_rad_s = sqrt(own * own + shake * shake);
         }
@@ -239,7 +246,7 @@ impl Measurement {
     /// stream ended before one was full, it is all there is. `stretch` is the share by which the window may be stretched, the roll
     /// what the camera may turn by.
     fn widen_coarse(&mut self, window: &Window<'_>, stretch: f32, roll_rad_s: f32) {
-        self.widen_mark();
+        self.widen_mark(SHAKE_PX);
         let short = window.duration_us < BASE_WINDOW_US;
         let most = if short { MOST_SHORT_SIGMA } else { MOST_ERROR / COARSE_SIGMAS };
         let stretched = stretch > MOST_ERROR;
