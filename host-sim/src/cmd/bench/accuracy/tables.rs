@@ -37,6 +37,24 @@ const HANDHELD: [Column; 10] = [
     ("roll", Window::Adaptive, false, Stage::Roll),
 ];
 
+/// What a column is compared with: the head of the quotient, and its two columns.
+type Limit = (&'static str, Column, Column);
+
+/// All that the rotor's events hold, which any reading may reach.
+const BOUND: Limit = (
+    "x bound",
+    ("", Window::Adaptive, false, Stage::Own),
+    ("", Window::Adaptive, false, Stage::Bound),
+);
+/// What no method that only sees the rotor knows of its speed in the room.
+const ROLL: Limit = (
+    "x roll",
+    ("", Window::Adaptive, false, Stage::Room),
+    ("", Window::Adaptive, false, Stage::Roll),
+);
+/// Quotient up to which a cell is near its limit.
+const NEAR: f64 = 3.0;
+
 /// All tables: one of each kind for each event model and capacity.
 pub fn tables(cells: &Cells, models: &[Model], seeds: u64) -> Vec<Table> {
     let mut tables = Vec::new();
@@ -125,24 +143,24 @@ impl View<'_> {
 
     fn table(&self, title: &str, columns: &[Column], rows: &[Row]) -> Table {
         let mut notes = vec![
-            "RMAE in permille; bound: sqrt(12) jitter / (window sqrt(rotor events)); own: clock error taken out"
+            "RMAE in permille; bound: sqrt(12) jitter / (window sqrt(rotor events)); own: clock error taken out; x bound: own over bound"
                 .to_owned(),
         ];
         let mut heads = vec![String::new()];
         heads.extend(columns.iter().map(|c| c.0.to_owned()));
-        heads.extend(["x bound".to_owned(), "no reading".to_owned()]);
-        let own = ("", Window::Adaptive, false, Stage::Own);
-        let bound = ("", Window::Adaptive, false, Stage::Bound);
-        let mut far = Vec::new();
+        let rolls = columns.iter().any(|(_, _, _, stage)| *stage == Stage::Roll);
+        let limits: &[Limit] = if rolls { &[BOUND, ROLL] } else { &[BOUND] };
+        heads.extend(limits.iter().map(|(head, _, _)| (*head).to_owned()));
+        heads.push("no reading".to_owned());
+        let times = |places: &[Place], (_, of, limit): &Limit| {
+            Some(self.mean(places, of)? / self.mean(places, limit)?)
+        };
         let cells = rows.iter().map(|(name, places)| {
             let mut cells = vec![name.clone()];
             let value = |c: &Column| self.mean(places, c).map_or_else(|| "-".to_owned(), short);
             cells.extend(columns.iter().map(value));
-            let times = self.mean(places, &own).zip(self.mean(places, &bound)).map(|(o, b)| o / b);
-            if times.is_some_and(|times| times > 3.0) {
-                far.push(name.clone());
-            }
-            cells.push(times.map_or_else(|| "-".to_owned(), |t| format!("{t:.1}")));
+            let shown = |limit| times(places, limit).map_or("-".to_owned(), |t| format!("{t:.1}"));
+            cells.extend(limits.iter().map(shown));
             let missing = |p: &Place| {
                 let key = self.key(*p, Window::Adaptive, false);
                 self.cells.get(&key, Stage::Reading).map_or(0, |s| s.missing())
@@ -151,8 +169,12 @@ impl View<'_> {
             cells
         });
         let cells: Vec<Vec<String>> = cells.collect();
-        if !far.is_empty() {
-            notes.push(format!("more than 3 times the bound: {}", far.join(", ")));
+        for limit in limits {
+            let is_far = |(_, places): &&Row| times(places, limit).is_some_and(|t| t > NEAR);
+            let far: Vec<&str> = rows.iter().filter(is_far).map(|(name, _)| &**name).collect();
+            if !far.is_empty() {
+                notes.push(format!("{} above {NEAR}: {}", limit.0, far.join(", ")));
+            }
         }
         let title = format!(
             "{title} [{} model, {} memory, {} seeds]",
