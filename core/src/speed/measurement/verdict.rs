@@ -121,9 +121,10 @@ impl Measurement {
             self.status = Status::Refused(Reason::Ambiguous);
         }
         if let (None, Some(phase)) = (lock, phase) {
-            let both = combine(self.estimate, phase, 1.0);
-            let sigma_rad_s = both.sigma_rad_s.max(self.estimate.sigma_rad_s);
-            self.estimate = Estimate { sigma_rad_s, ..both };
+            // Both follow the same events: neither is surer than the phase, whose scatter shows how few there are.
+            let sigma_rad_s = self.estimate.sigma_rad_s.max(phase.sigma_rad_s);
+            let both = combine(Estimate { sigma_rad_s, ..self.estimate }, phase, 1.0);
+            self.estimate = Estimate { sigma_rad_s: both.sigma_rad_s.max(sigma_rad_s), ..both };
         }
         let clock = stated.clock_sigma_ppm * 1e-6 * self.estimate.omega_rad_s;
         let roll = if self.drift_px_s > STILL_PX_S {
