@@ -32,6 +32,9 @@ pub(super) const REFINEMENT_PERIODS: f32 = 0.4;
 const REFINED_SIGMAS: f32 = 4.0;
 /// Part of a symmetry period that the fractional-baseline test stops short by.
 pub(super) const FRACTION: f32 = 0.35;
+/// Shortest baseline of that test in symmetry periods, and how much shorter it is where few events match.
+const LEAST_FRACTIONAL: f32 = 1.0 - FRACTION;
+const SHORTER: f32 = 0.25;
 /// Baseline of the lock as a share of the window.
 const LOCK_SHARE: f32 = 2.0 / 3.0;
 /// Relative error that the speed is thought to have before the lock: what refinement says, within these.
@@ -160,7 +163,7 @@ impl Measurement {
         }
         let effort = if self.follows { Effort { pairs: 1, ..FOLLOWING } } else { FRACTIONAL };
         self.turn = 0;
-        self.plan(window, (longest - FRACTION).max(0.65), effort);
+        self.plan(window, (longest - FRACTION).max(LEAST_FRACTIONAL), effort);
         self.stage = Stage::Fractional;
     }
 
@@ -170,7 +173,14 @@ impl Measurement {
         self.evidence.fractional_deviation = pairs.deviation();
         if self.turn == 0 && !self.follows && !self.fits_between() {
             self.turn = 1;
-            self.plan(window, pairs.periods(), FRACTIONAL_AGAIN);
+            let mut periods = pairs.periods();
+            if pairs.deviation().is_none() {
+                // Too few events match: a shorter baseline leaves room for more periods in a slice.
+                let parts = self.pace().parts as f32;
+                let whole = crate::math::floor(SHORTER * periods / parts) * parts;
+                periods = (whole - FRACTION).max(LEAST_FRACTIONAL);
+            }
+            self.plan(window, periods, FRACTIONAL_AGAIN);
             return;
         }
         self.stage = Stage::Verdict;
