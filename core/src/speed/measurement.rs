@@ -29,7 +29,7 @@ const FOLLOWING_SIGMA: f32 = 1e-3;
 /// looks like 20.
 const MOVING_PX_S: f32 = 25.0;
 /// Fewest events of a rotor that are measured.
-const LEAST_EVENTS: usize = 300;
+const LEAST_EVENTS: usize = 200;
 /// Symmetry periods and revolutions that a lock needs in the window.
 const LOCK_PERIODS: f32 = 3.0;
 const LOCK_REVOLUTIONS: f32 = 2.0;
