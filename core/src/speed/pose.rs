@@ -401,7 +401,11 @@ impl Pose {
     /// Looks at the events of a segment: how far the blocks are off the template, and the templates of this harmonic
     /// and of twice it. Early rounds look at some events only.
     fn look(&self, window: &Window<'_>, sums: &mut Sums) {
-        let stride = self.events.div_ceil(self.schedule.events(self.events)).max(1);
+        let one_of = self.events.div_ceil(self.schedule.events(self.events)).max(1);
+        // A sample of events has to do at first, and where the store has thinned them; else one of pixels, each with all its
+        // events, so that what is fixed to them cancels from period to period.
+        let by_event = self.schedule.samples() || self.even_share < 1.0;
+        let (stride, one_of) = if by_event { (one_of, 1) } else { (1, one_of) };
         let disc = Moving::new(self.disc, &self.path, window);
         let rate = TurnRate::from_rad_s(self.omega_rad_s);
         let rings = (RINGS / self.sectors as usize).max(1);
@@ -411,6 +415,9 @@ impl Pose {
         let tilts = self.tilt.is_some() && self.schedule.samples();
         let mut seen = Vec::new();
         for event in window.segment(self.segment).iter().step_by(stride) {
+            if !event.is_of(one_of as u32) {
+                continue;
+            }
             let t_us = disc.since_middle_us(*event);
             let (index, f) = self.path.place(t_us as f32);
             let knot = self.path.between((index, f));

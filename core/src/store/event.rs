@@ -64,6 +64,16 @@ impl StoredEvent {
         self.y_weight_polarity & POLARITY_BIT != 0
     }
 
+    /// Whether the event is one of those of a share of the pixels: one of `one_of`, at least 1, with all their events. Pixels are chosen
+    /// by a hash, evenly and without a pattern.
+    #[inline]
+    #[must_use]
+    pub const fn is_of(self, one_of: u32) -> bool {
+        let mixed = (self.x() as u32 | (self.y() as u32) << 16).wrapping_mul(0x9E37_79B1);
+        let hash = (mixed ^ (mixed >> 15)).wrapping_mul(0x85EB_CA77) >> 16;
+        hash * one_of < 1 << 16
+    }
+
     /// Time since `origin_us` in microseconds.
     #[must_use]
     pub const fn since(self, origin_us: u64) -> i32 {

@@ -275,3 +275,19 @@ fn a_segment_after_a_far_busier_one_still_begins_with_a_burst_and_tells_what_it_
     // The last stands for as many as it would have, had as many come as before.
     assert!((100..100 + 256).contains(&stands_for), "{stands_for}");
 }
+
+#[test]
+fn a_share_of_the_pixels_is_as_large_as_asked_and_spread_evenly() {
+    let event = |x, y| {
+        let event = Event { t_us: 0, x, y, polarity: Polarity::On };
+        StoredEvent::store(PackedEvent::pack(&event), 0)
+    };
+    for one_of in [1_u32, 3, 11] {
+        for (x0, y0) in [(0, 0), (64, 0), (640, 360)] {
+            let places = (0..64).flat_map(|y| (0..64).map(move |x| (x0 + x, y0 + y)));
+            let taken = places.filter(|&(x, y)| event(x, y).is_of(one_of)).count();
+            let expected = 4096.0 / f64::from(one_of);
+            assert!((taken as f64 / expected - 1.0).abs() < 0.15, "{taken} for one of {one_of}");
+        }
+    }
+}

@@ -24,7 +24,7 @@ pub use ties::Ties;
 pub enum Capacity {
     /// What the handheld device has.
     Device,
-    /// Sixteen times as much.
+    /// Thirty-two times as much: every event of 150 ms at 2.6 Mev/s, and of 400 ms at 1 Mev/s.
     Full,
 }
 
@@ -46,7 +46,7 @@ impl Capacity {
     pub const fn events(self) -> usize {
         match self {
             Self::Device => DEVICE_EVENTS,
-            Self::Full => 16 * DEVICE_EVENTS,
+            Self::Full => 32 * DEVICE_EVENTS,
         }
     }
 

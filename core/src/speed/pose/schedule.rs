@@ -26,23 +26,36 @@ pub struct Schedule {
     round: u8,
     /// Most rounds by phase.
     most: [u8; 4],
-    /// Events looked at before [`Phase::All`], and the share of all events, at most 65 536, looked at from then on.
+    /// Events looked at before [`Phase::All`], and the share of all events, and the most, that are looked at from then on.
     first_events: usize,
     share: usize,
+    most_events: usize,
 }
 
-/// Most events that are looked at.
-const MOST_EVENTS: usize = 65_536;
+/// Most events of a rotor that was followed that are looked at: a PC keeps up with twenty readings a second of it.
+const MOST_FOLLOWED: usize = 65_536;
 /// Blocks of the path in the first two phases.
 const FIRST_BLOCKS: usize = 12;
 const SECOND_BLOCKS: usize = 24;
 
 impl Schedule {
     /// For a rotor of which little is known.
-    pub const NEW: Self =
-        Self { phase: Phase::First, round: 0, most: [3, 1, 6, 3], first_events: 3_072, share: 1 };
+    pub const NEW: Self = Self {
+        phase: Phase::First,
+        round: 0,
+        most: [3, 1, 6, 3],
+        first_events: 3_072,
+        share: 1,
+        most_events: usize::MAX,
+    };
     /// For a rotor that was followed in the window before: a third of the events tell it as well.
-    pub const KNOWN: Self = Self { most: [1, 0, 2, 1], first_events: 1_280, share: 3, ..Self::NEW };
+    pub const KNOWN: Self = Self {
+        most: [1, 0, 2, 1],
+        first_events: 1_280,
+        share: 3,
+        most_events: MOST_FOLLOWED,
+        ..Self::NEW
+    };
     /// The same for one that a hand moved meanwhile, which is known by its parts alone.
     pub const MOVED: Self = Self { most: [1, 1, 4, 1], ..Self::KNOWN };
 
@@ -94,7 +107,7 @@ impl Schedule {
         if self.samples() {
             self.first_events
         } else {
-            (all / self.share).clamp(self.first_events, MOST_EVENTS)
+            (all / self.share).clamp(self.first_events, self.most_events)
         }
     }
 
