@@ -239,10 +239,11 @@ fn errors(scene: &Scene) -> Vec<f64> {
 /// speed relative to the camera is known exactly.
 #[test]
 fn every_reading_of_a_series_from_the_hand() {
-    const LARGEST_SHARE: f64 = 1e-3;
+    const LARGEST_SHARE: f64 = 5e-4;
     let mut failures = Vec::new();
+    let slow = [4, 13, 17, 19].map(|seed| (300.0, seed, 2));
     let fast = [0, 13, 51, 57, 129, 134].map(|seed| (600.0, seed, 3));
-    for (rpm, seed, least) in fast {
+    for (rpm, seed, least) in slow.into_iter().chain(fast) {
         let rotor = Rotor { blades: 3, rpm, radius_px: 50.0, ..Rotor::default() };
         let off = errors(&Scene {
             camera: Camera { tremor_mrad: 0.0, ..presets::hand() },

@@ -10,7 +10,7 @@ use super::angular::AngularSums;
 use super::baseline::{Estimate, Pairs};
 use super::initial::{Ladder, Rates};
 use super::polar::{PolarTrack, track};
-use super::pose::{Pose, Sums, Tilt};
+use super::pose::{MOVING_PX_S, Pose, Sums, Tilt};
 use super::statistics::root_mean_square;
 use crate::math::TAU;
 use crate::reading::{Evidence, Frame, Reason, Speed, Status};
@@ -25,9 +25,6 @@ const ACCELERATION_SIGMAS: f32 = 4.0;
 const TILTED_PARTS: u8 = 3;
 /// Relative error of the speed of a rotor that is followed from window to window.
 const FOLLOWING_SIGMA: f32 = 1e-3;
-/// Root mean square speed of the axis in px/s from which on the camera moves: a hand makes some 80, and what few events scatter by
-/// looks like 20.
-const MOVING_PX_S: f32 = 25.0;
 /// Fewest events of a rotor that are measured.
 const LEAST_EVENTS: usize = 200;
 /// Symmetry periods and revolutions that a lock needs in the window.

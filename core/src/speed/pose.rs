@@ -49,6 +49,10 @@ const SHARP_COHERENCE: f32 = 0.5;
 /// The same where blocks hold few events: a path that went astray at a sparse end does not find back to a harmonic so fine.
 const SPARSE_COHERENCE: f32 = 0.7;
 
+/// Root mean square speed of the axis in px/s from which on the camera moves: a hand makes some 80, and what few events scatter by
+/// looks like 20.
+pub const MOVING_PX_S: f32 = 25.0;
+
 /// Sums of one round.
 #[derive(Clone, Debug)]
 pub struct Sums {
@@ -339,7 +343,9 @@ impl Pose {
         let least = if self.is_sparse() { SPARSE_COHERENCE } else { SHARP_COHERENCE };
         let shows =
             |least: f32| fine && at_high > least * self.first_coherence && 2.0 * at_high > at_low;
-        let sharper = (at_high > at_low || shows(least)) && self.may_double();
+        // The path comes first: all events correct it by this template before one of twice the harmonic is believed.
+        let waits = self.schedule.phase() >= Phase::All && self.phases.is_none();
+        let sharper = (at_high > at_low || shows(least)) && self.may_double() && !waits;
         // Few events show it as well as many, but a path does not follow them.
         self.overtone = if shows(SHARP_COHERENCE) && !sharper { at_high } else { 0.0 };
         self.harmonic *= if sharper { 2 } else { 1 };
@@ -350,6 +356,13 @@ impl Pose {
         self.phases = Some(if sharper { &sums.high } else { &sums.low }.phases(&sums.counts));
         if self.schedule.advance(if sharper { f32::MAX } else { moved_px }) {
             self.divide();
+            let moves = self.drift_px_s() > MOVING_PX_S;
+            if moves && self.schedule.reaches_out() && self.harmonic > self.first_harmonic {
+                // A sample leaves the path off by more than the harmonic's reach where a hand moves fast: half of it reaches
+                // farther, and all events follow it as finely.
+                self.harmonic /= 2;
+                self.phases = None;
+            }
         }
         false
     }

@@ -69,6 +69,11 @@ impl Schedule {
         self.phase > Phase::Fine || self.phase == Phase::Fine && self.round > 0
     }
 
+    /// Whether the first of several rounds that look at all events is next: it learns the template anew.
+    pub fn reaches_out(&self) -> bool {
+        self.phase == Phase::All && self.round == 0 && self.most[3] > 1
+    }
+
     /// The template has to be learnt anew: the last phase that corrects the path begins again, if it has begun.
     pub const fn again(&mut self) {
         if matches!(self.phase, Phase::All | Phase::Last) {

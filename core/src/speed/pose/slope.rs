@@ -77,7 +77,8 @@ impl Pose {
         })
     }
 
-    fn drift_px_s(&self) -> f32 {
+    /// Root mean square speed of the axis along the path, in px/s.
+    pub(super) fn drift_px_s(&self) -> f32 {
         let size = self.path.blocks().div_ceil(DRIFT_BLOCKS).max(1);
         let dt_s = size as f32 * self.path.step_us() * 1e-6;
         let mean = |knots: &[Knot]| {
