@@ -13,6 +13,7 @@ mod peers;
 mod report;
 mod score;
 mod spec;
+mod throughput;
 mod trust;
 
 mod cost;
@@ -36,6 +37,8 @@ enum Table {
     Image(image::Args),
     /// Events decoded a second, for each format, beside faery.
     Decode(decode::Args),
+    /// Events measured a second on one core of this PC, from memory.
+    Throughput(throughput::Args),
     /// Relative error by speed, distance, blades, hand and vibration: the paper's evaluations.
     Accuracy(accuracy::Args),
     /// Share of right readings over 60 to 60 000 rpm and 1 to 8 blades.
@@ -69,7 +72,11 @@ pub struct Common {
 /// Runs the subcommand.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let common = match &args.table {
-        Table::Cost(_) | Table::Budget(_) | Table::Image(_) | Table::Decode(_) => None,
+        Table::Cost(_)
+        | Table::Budget(_)
+        | Table::Image(_)
+        | Table::Decode(_)
+        | Table::Throughput(_) => None,
         Table::Accuracy(args) => Some(args.common),
         Table::Blind(args) => Some(args.common),
         Table::Peers(args) => Some(args.common),
@@ -83,6 +90,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         Table::Budget(args) => return budget::run(&args),
         Table::Image(args) => return image::run(&args),
         Table::Decode(args) => return decode::run(&args),
+        Table::Throughput(args) => return throughput::run(&args),
         Table::Accuracy(args) => accuracy::run(&args)?,
         Table::Blind(args) => blind::run(&args)?,
         Table::Peers(args) => peers::run(&args)?,
