@@ -24,7 +24,7 @@ pub use ties::Ties;
 pub enum Capacity {
     /// What the handheld device has.
     Device,
-    /// Thirty-two times as much: every event of 150 ms at 2.6 Mev/s, and of 400 ms at 1 Mev/s.
+    /// Thirty-two times as much: every event of 150 ms at 2.6 Mev/s, and of 300 ms at 1.3 Mev/s.
     Full,
 }
 

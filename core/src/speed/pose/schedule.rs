@@ -71,7 +71,7 @@ impl Schedule {
 
     /// Whether the first of several rounds that look at all events is next: it learns the template anew.
     pub fn reaches_out(&self) -> bool {
-        self.phase == Phase::All && self.round == 0 && self.most[3] > 1
+        self.phase == Phase::All && self.round == 0 && self.most[Phase::All as usize] > 1
     }
 
     /// The template has to be learnt anew: the last phase that corrects the path begins again, if it has begun.
