@@ -8,6 +8,7 @@ mod backdrop;
 mod blades;
 pub mod edges;
 mod field;
+mod made;
 pub mod motion;
 mod pixel;
 pub mod presets;
@@ -17,10 +18,11 @@ pub mod scene;
 pub mod threshold;
 pub mod truth;
 
-use evtach_core::{Event, GyroSample, Polarity};
+use evtach_core::{Event, GyroSample};
 use rayon::prelude::*;
 
 use field::Field;
+use made::Made;
 pub use motion::Motion;
 use pixel::{Pixel, Span, Tray};
 use random::{Purpose, normal, stream};
@@ -62,7 +64,7 @@ pub fn generate(scene: &Scene) -> Result<Synthetic, SceneError> {
     let rows: Vec<Tray> = (0..scene.height_px)
         .into_par_iter()
         .map(|y| {
-            let mut tray = Tray { events: Vec::new(), of_rotor: vec![0; contrasts.len()] };
+            let mut tray = Tray::new();
             for x in 0..scene.width_px {
                 let mut pixel = Pixel::new(&scene.sensor, scene.seed, x, y);
                 pixel.noise(scene.sensor.noise_hz, false, &span, &mut tray);
@@ -77,37 +79,30 @@ pub fn generate(scene: &Scene) -> Result<Synthetic, SceneError> {
         })
         .collect();
 
-    let mut of_rotor = vec![0; contrasts.len()];
-    let mut events = Vec::with_capacity(rows.iter().map(|r| r.events.len()).sum());
-    for row in rows {
-        events.extend(row.events);
-        of_rotor.iter_mut().zip(row.of_rotor).for_each(|(sum, count)| *sum += count);
-    }
-    events.extend(hot_pixels(scene, &span));
-    events.par_sort_unstable_by_key(order);
+    let mut made = Vec::with_capacity(rows.iter().map(Vec::len).sum());
+    rows.into_iter().for_each(|row| made.extend(row));
+    made.extend(hot_pixels(scene, &span));
+    made.par_sort_unstable();
     let dropped = match scene.sensor.readout_mev_s {
         Some(rate) => {
             let end_us = (duration_s * ticks_per_s) as u64;
-            readout::limit(&mut events, rate, scene.sensor.readout_queue, end_us)
+            readout::limit(&mut made, rate, scene.sensor.readout_queue, end_us)
         }
         None => 0,
     };
-    let truth = Truth::new(scene, &motion, &of_rotor, events.len() as u64, dropped);
+    let mut of_rotor = vec![0; contrasts.len()];
+    for rotor in made.iter().filter_map(|made| made.rotor()) {
+        of_rotor[rotor] += 1;
+    }
+    let truth = Truth::new(scene, &motion, &of_rotor, made.len() as u64, dropped);
+    let events = made.into_iter().map(Made::event).collect();
     Ok(Synthetic { events, gyro: gyro_samples(scene, &motion, &span), truth })
 }
 
-/// Sorts by time, then row, column, polarity: equal stamps come out in one order whatever made them.
-fn order(event: &Event) -> u64 {
-    event.t_us << 23
-        | u64::from(event.y) << 12
-        | u64::from(event.x) << 1
-        | u64::from(event.polarity == Polarity::On)
-}
-
-fn hot_pixels(scene: &Scene, span: &Span) -> Vec<Event> {
+fn hot_pixels(scene: &Scene, span: &Span) -> Tray {
     use rand::Rng as _;
     let mut places = stream(scene.seed, Purpose::Hot, 0);
-    let mut tray = Tray::default();
+    let mut tray = Tray::new();
     for number in 0..scene.sensor.hot_pixels {
         let x = places.random_range(0..scene.width_px);
         let y = places.random_range(0..scene.height_px);
@@ -116,7 +111,7 @@ fn hot_pixels(scene: &Scene, span: &Span) -> Vec<Event> {
         let seed = scene.seed ^ 0x5eed_0000 ^ u64::from(number);
         Pixel::new(&scene.sensor, seed, x, y).noise(rate_hz, true, span, &mut tray);
     }
-    tray.events
+    tray
 }
 
 fn gyro_samples(scene: &Scene, motion: &Motion, span: &Span) -> Vec<GyroSample> {

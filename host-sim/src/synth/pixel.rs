@@ -5,6 +5,7 @@ use rand::Rng as _;
 use rand_distr::{Distribution as _, Exp1};
 use rand_pcg::Pcg64Mcg;
 
+use super::made::Made;
 use super::random::{Purpose, normal, stream};
 use super::scene::Sensor;
 
@@ -20,14 +21,8 @@ pub struct Pixel<'a> {
     rng: Pcg64Mcg,
 }
 
-/// Where events go: those of one row of pixels.
-#[derive(Debug, Default)]
-pub struct Tray {
-    /// Events within the recording, in the order they were made.
-    pub events: Vec<Event>,
-    /// Events of each rotor among them.
-    pub of_rotor: Vec<u64>,
-}
+/// Where events go: those of one row of pixels within the recording, in the order they were made.
+pub type Tray = Vec<Made>;
 
 /// Recording span and clock.
 #[derive(Clone, Copy, Debug)]
@@ -95,10 +90,7 @@ impl<'a> Pixel<'a> {
         let lost = rotor.is_some() && self.rng.random::<f64>() < self.sensor.dropout;
         let delay = self.latency_s + self.sensor.jitter_us * 1e-6 * normal(&mut self.rng);
         let Some(t_us) = span.stamp(t_s + delay).filter(|_| !lost) else { return };
-        if let Some(count) = rotor.and_then(|r| tray.of_rotor.get_mut(r)) {
-            *count += 1;
-        }
-        self.put(t_us, polarity, tray);
+        self.put(t_us, polarity, rotor, tray);
     }
 
     /// Adds events that come from nowhere, at a rate in Hz.
@@ -112,12 +104,12 @@ impl<'a> Pixel<'a> {
             t_s += gap / rate_hz;
             let Some(t_us) = span.stamp(t_s) else { return };
             let on = on_only || self.rng.random::<bool>();
-            self.put(t_us, if on { Polarity::On } else { Polarity::Off }, tray);
+            self.put(t_us, if on { Polarity::On } else { Polarity::Off }, None, tray);
         }
     }
 
-    fn put(&self, t_us: u64, polarity: Polarity, tray: &mut Tray) {
+    fn put(&self, t_us: u64, polarity: Polarity, rotor: Option<usize>, tray: &mut Tray) {
         let polarity = if self.sensor.all_on { Polarity::On } else { polarity };
-        tray.events.push(Event { t_us, x: self.x, y: self.y, polarity });
+        tray.push(Made::new(Event { t_us, x: self.x, y: self.y, polarity }, rotor));
     }
 }

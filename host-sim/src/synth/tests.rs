@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use evtach_core::Polarity;
+
 use super::scene::{Background, Camera, Clock, Gyro, Lamp, Mover, Sensor, Shape, Vibration};
 use super::*;
 
@@ -161,6 +163,7 @@ fn a_slow_readout_loses_and_counts() {
     let mut scene = fixed(Model::Edge, 3000.0);
     let all = generate(&scene).unwrap();
     assert_eq!(all.truth.dropped, 0);
+    let all_events = all.events.len() as f64;
     scene.sensor.readout_mev_s = Some(0.8);
     scene.sensor.readout_queue = 500;
     let some = generate(&scene).unwrap();
@@ -171,6 +174,10 @@ fn a_slow_readout_loses_and_counts() {
     assert!(missing <= 501, "{missing}");
     let per_ms = some.events.iter().filter(|e| e.t_us / 1000 == 100).count();
     assert!(per_ms <= 801, "{per_ms}");
+    // The truth counts what is left of the rotor's: noise is lost as well.
+    let left = |all: u64| all as f64 * some.events.len() as f64 / all_events;
+    let of_rotor = some.truth.rotors[0].events as f64;
+    assert!((of_rotor / left(all.truth.rotors[0].events) - 1.0).abs() < 0.02, "{of_rotor}");
 }
 
 #[test]

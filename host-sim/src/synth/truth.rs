@@ -41,7 +41,7 @@ pub struct RotorTruth {
     pub phase0_rad: f64,
     /// Tilt of the axis against the line of sight in degrees.
     pub tilt_deg: f64,
-    /// Events this rotor caused, before the readout.
+    /// Events that this rotor caused and that are in the recording: those lost in the readout are not.
     pub events: u64,
 }
 
