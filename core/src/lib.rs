@@ -18,6 +18,6 @@ pub mod tracker;
 
 pub use event::{Event, Geometry, GyroSample, PackedEvent, Polarity};
 pub use reading::{Direction, Evidence, Frame, Reading, Reason, RotorReading, Speed, Status};
-pub use settings::{Ignored, Memory, Poll, Roi, Settings};
+pub use settings::{Ignored, Memory, More, Poll, Roi, Settings};
 pub use store::StoredEvent;
 pub use tachometer::{Tachometer, Work};

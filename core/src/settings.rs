@@ -2,6 +2,7 @@
 
 use crate::event::Geometry;
 use crate::reading::Reading;
+use crate::speed::polar::PolarTrack;
 use crate::store::StoredEvent;
 use crate::tachometer::Work;
 
@@ -75,6 +76,18 @@ pub struct Memory<'m> {
     pub weights: &'m mut [u8],
     /// What measuring works in.
     pub work: &'m mut Work,
+    /// Room for more events than fit there, by which a window is searched once more; the device lends none.
+    pub more: Option<More<'m>>,
+}
+
+/// Room for more events, among which what the first search missed is looked for: what a share s of N events keeps step with stands out
+/// from chance by s^2 N.
+#[derive(Debug)]
+pub struct More<'m> {
+    /// Times of those that are searched: more than [`crate::limits::VISITS`], and at most 65 535.
+    pub times: &'m mut [u16],
+    /// Those of a rotor whose centre, speed and harmonic are looked for: more than [`crate::limits::POLAR_EVENTS`].
+    pub track: &'m mut PolarTrack,
 }
 
 /// What [`crate::Tachometer::poll`] did.

@@ -14,12 +14,12 @@ mod work;
 
 use heapless::Vec;
 
-use crate::limits::{MAX_ROTORS, MAX_SUSPECTS};
+use crate::limits::{MAX_ROTORS, MAX_SUSPECTS, POLAR_EVENTS};
 use crate::rotors::extraction::{Extraction, Round};
 use crate::rotors::{Found, HeatMap, Spectrum};
-use crate::settings::{Ignored, Memory, Settings};
+use crate::settings::{Ignored, Memory, More, Settings};
 use crate::speed::measurement::{Measurement, Outcome};
-use crate::speed::polar::PolarTrack;
+use crate::speed::polar::PolarEvents;
 use crate::store::{Store, WINDOW_SEGMENTS};
 use crate::tracker::Tracker;
 use rhythm::Rhythm;
@@ -62,6 +62,7 @@ pub struct Tachometer<'m> {
     store: Store<'m>,
     heat: HeatMap<'m>,
     weights: &'m mut [u8],
+    more: Option<More<'m>>,
     started: bool,
     last_us: u64,
     target_us: u32,
@@ -78,7 +79,7 @@ pub struct Tachometer<'m> {
     satisfied: bool,
     ignored: Ignored,
     job: Job,
-    polar: &'m mut PolarTrack,
+    polar: &'m mut PolarEvents<POLAR_EVENTS>,
     spectrum: &'m mut Spectrum,
     scratch: &'m mut Scratch,
     candidates: Vec<Suspect, MAX_SUSPECTS>,
@@ -86,6 +87,8 @@ pub struct Tachometer<'m> {
     in_step_hz: Option<f32>,
     /// Whether a rotor that is followed was not locked in this window.
     lost: bool,
+    /// How often all of the picture was searched in this window: the second time among as many events as more room was lent for.
+    searches: u8,
     tracker: Tracker,
     /// Readings until the whole image is searched again, or [`rhythm::NEVER`].
     until_search: u8,
@@ -121,6 +124,7 @@ impl<'m> Tachometer<'m> {
             store: Store::new(memory.events, rhythm.spare, segment_us(FIRST_WINDOW_US)),
             heat,
             weights: memory.weights,
+            more: memory.more,
             started: false,
             last_us: 0,
             target_us: settings.window_us.unwrap_or(BASE_WINDOW_US),
@@ -138,6 +142,7 @@ impl<'m> Tachometer<'m> {
             outcomes: Vec::new(),
             in_step_hz: None,
             lost: false,
+            searches: 0,
             tracker: Tracker::default(),
             until_search: 0,
             round: Round::default(),

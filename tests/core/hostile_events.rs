@@ -144,8 +144,13 @@ fn play(settings: Settings, inputs: &[Input], store_events: usize, heat_cells: u
     let mut events = vec![StoredEvent::default(); store_events];
     let (mut heat, mut weights) = (vec![0; heat_cells], vec![0; heat_cells]);
     let mut work = Box::new(Work::EMPTY);
-    let memory =
-        Memory { events: &mut events, heat: &mut heat, weights: &mut weights, work: &mut work };
+    let memory = Memory {
+        events: &mut events,
+        heat: &mut heat,
+        weights: &mut weights,
+        work: &mut work,
+        more: None,
+    };
     let mut tachometer = Tachometer::new(settings, memory);
     let mut readings = Vec::new();
     for input in inputs {

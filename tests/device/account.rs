@@ -141,8 +141,13 @@ async fn measure(mut blocks: Receiver<'_, NoopRawMutex, Block>) -> Measured {
     let mut events = vec![StoredEvent::default(); DEVICE_EVENTS];
     let (mut heat, mut weights) = (vec![0; DEVICE_HEAT_CELLS], vec![0; DEVICE_HEAT_CELLS]);
     let mut work = Box::new(Work::EMPTY);
-    let memory =
-        Memory { events: &mut events, heat: &mut heat, weights: &mut weights, work: &mut work };
+    let memory = Memory {
+        events: &mut events,
+        heat: &mut heat,
+        weights: &mut weights,
+        work: &mut work,
+        more: None,
+    };
     let mut tachometer = Tachometer::new(Settings::new(GEOMETRY), memory);
     let mut measured = Measured::default();
     for number in 1_u64.. {

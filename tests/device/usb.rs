@@ -70,8 +70,13 @@ fn read_over_usb(
     let mut store = vec![StoredEvent::default(); DEVICE_EVENTS];
     let (mut heat, mut weights) = (vec![0; DEVICE_HEAT_CELLS], vec![0; DEVICE_HEAT_CELLS]);
     let mut work = Box::new(Work::EMPTY);
-    let memory =
-        Memory { events: &mut store, heat: &mut heat, weights: &mut weights, work: &mut work };
+    let memory = Memory {
+        events: &mut store,
+        heat: &mut heat,
+        weights: &mut weights,
+        work: &mut work,
+        more: None,
+    };
     let mut tachometer = Tachometer::new(Settings::new(model.geometry()), memory);
     let mut readings = Readings::default();
     let mut acquired = Acquired::NONE;

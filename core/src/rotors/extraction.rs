@@ -180,7 +180,7 @@ pub struct Extraction {
 /// Memory that an extraction works in.
 #[derive(Debug, Default)]
 pub struct Scratch {
-    /// When each cell is visited.
+    /// Where the times lie at which each cell is visited.
     pub visits: Visits,
     /// Phases around one disc.
     pub coherence: Coherence,
@@ -197,6 +197,8 @@ pub struct View<'a> {
     pub grid: CellGrid,
     /// Weights of these cells.
     pub weights: &'a mut [u8],
+    /// Room for the times of the events that are searched.
+    pub times: &'a mut [u16],
 }
 
 impl Extraction {
@@ -215,7 +217,7 @@ impl Extraction {
     ) -> bool {
         match self.stage {
             Stage::Visits => self.visits(view, spectrum, scratch),
-            Stage::Lags => self.lags(spectrum, scratch),
+            Stage::Lags => self.lags(view, spectrum, scratch),
             Stage::Spectrum => self.spectrum(view, spectrum, scratch),
             Stage::Line => self.line(view, scratch),
             Stage::Map => self.map(view, scratch),

@@ -12,14 +12,14 @@ use super::disc::Disc;
 use super::heat::CellGrid;
 use super::lines::LAGS;
 use crate::event::Geometry;
-use crate::limits::{VISIT_CELLS, VISITS};
+use crate::limits::VISIT_CELLS;
 use crate::math::{Turn, sqrt};
 use crate::store::{Even, StoredEvent, Window};
 
 /// Time is counted in this many parts of the window; the bit below them holds the polarity.
 const TICKS_LOG2: u32 = 15;
-/// Most events of one cell of which pairs are made.
-const MOST_IN_CELL: usize = 128;
+/// Pairs are made of at most this part of all events that there is room for in one cell: 128 on the device.
+const MOST_IN_CELL_SHARE: usize = 48;
 /// Pairs in one step: half a million instructions.
 const PAIRS_A_STEP: usize = 30_000;
 /// Events and cells of the map in one step, the same.
@@ -39,15 +39,14 @@ pub const COARSEST_LOG2: u8 = 4;
 /// Longest row of cells: [`Geometry::MAX_PX`] in cells of 4 px.
 const MOST_COLUMNS: usize = Geometry::MAX_PX as usize / 4;
 
-/// Times of the events in each cell.
+/// Where the times of the events in each cell lie in the memory that is lent for them: time in parts of the window, and polarity in
+/// the lowest bit, cell by cell, oldest first.
 #[derive(Debug)]
 pub struct Visits {
     grid: CellGrid,
     window_us: u32,
     /// Where the times of each cell end; they start where those of the cell before end.
     ends: [u16; VISIT_CELLS],
-    /// Time in parts of the window, and polarity in the lowest bit, cell by cell, oldest first.
-    times: [u16; VISITS],
     /// Next cell to make pairs of, or to map.
     cell: usize,
     /// What unrelated events would add up to.
@@ -69,7 +68,6 @@ impl Default for Visits {
             grid: CellGrid::default(),
             window_us: 1,
             ends: [0; VISIT_CELLS],
-            times: [0; VISITS],
             cell: 0,
             chance: Chance::default(),
         }
@@ -100,12 +98,12 @@ impl Visits {
     }
 
     /// Starts over on another grid, or outside other discs.
-    pub fn clear(&mut self, grid: CellGrid) {
+    pub fn clear(&mut self, grid: CellGrid, times: &mut [u16]) {
         self.grid = grid;
         self.cell = 0;
         self.chance = Chance::default();
         self.ends.fill(0);
-        self.times.fill(0);
+        times.fill(0);
     }
 
     /// The cells that the visits are filled into: coarser ones than they were cleared for, where the events wanted these.
@@ -123,8 +121,10 @@ impl Visits {
         taken: &[Disc],
         filling: &mut Filling,
         least_company: f32,
+        times: &mut [u16],
     ) -> Option<(usize, f32)> {
         let (grid, start_us) = (self.grid, window.start_us);
+        let room = most(times);
         self.window_us = window.duration_us.max(1);
         let free = |x: u16, y: u16| {
             let at = Disc { x_px: f32::from(x), y_px: f32::from(y), radius_px: 0.0 };
@@ -134,40 +134,40 @@ impl Visits {
             let (x, y) = (event.x(), event.y());
             (grid.holds(x, y) && free(x, y)).then(|| grid.index(x, y))
         };
-        let Filling { even, counted, left } = filling;
+        let Filling { even, counted, placed } = filling;
         let take = |event: StoredEvent, cell: usize| {
-            if *left == 0 {
+            if *placed == room {
                 return;
             }
-            *left -= 1;
+            *placed += 1;
             let Some(place) = self.ends.get_mut(cell) else { return };
             if *counted {
                 let tick = tick(event.since(start_us), self.window_us);
-                if let Some(time) = self.times.get_mut(usize::from(*place)) {
+                if let Some(time) = times.get_mut(usize::from(*place)) {
                     *time = (tick << 1) | u16::from(event.is_on());
                 }
             } else if event.is_on()
-                && let Some(on) = self.times.get_mut(cell)
+                && let Some(on) = times.get_mut(cell)
             {
                 *on += 1;
             }
             *place += 1;
         };
-        if !even.step(window, VISITS, inside, take) {
+        if !even.step(window, room, inside, take) {
             return None;
         }
         if *counted {
-            return Some(self.filled());
+            return Some(self.filled(times));
         }
-        while self.grid.cell_log2 < COARSEST_LOG2 && self.counted_company() < least_company {
-            self.merge();
+        while self.grid.cell_log2 < COARSEST_LOG2 && self.counted_company(times) < least_company {
+            self.merge(times);
         }
         self.place_in(filling);
         None
     }
 
     /// Makes ready to place the events in larger cells: they were counted before.
-    pub fn place_in_coarser(&mut self, filling: &mut Filling) {
+    pub fn place_in_coarser(&mut self, filling: &mut Filling, times: &mut [u16]) {
         // From ends to counts.
         let mut start = 0;
         for end in &mut self.ends {
@@ -175,8 +175,8 @@ impl Visits {
             start += *end;
         }
         // Where the brighter events of each cell were counted there are times now, which add up to nothing.
-        self.times.fill(0);
-        self.merge();
+        times.fill(0);
+        self.merge(times);
         self.cell = 0;
         self.chance = Chance::default();
         self.place_in(filling);
@@ -191,15 +191,15 @@ impl Visits {
             start += count;
         }
         filling.even.again();
-        (filling.counted, filling.left) = (true, VISITS);
+        (filling.counted, filling.placed) = (true, 0);
     }
 
     /// The company of the events that were counted, of either polarity.
-    fn counted_company(&self) -> f32 {
+    fn counted_company(&self, times: &[u16]) -> f32 {
         let (mut company, mut events) = (0_u32, 0_u32);
         for (cell, count) in self.ends.iter().enumerate().take(self.grid.len()) {
             let count = u32::from(*count);
-            let on = self.times.get(cell).map_or(count / 2, |on| u32::from(*on));
+            let on = times.get(cell).map_or(count / 2, |on| u32::from(*on));
             let off = count.saturating_sub(on);
             company += on * on.saturating_sub(1) + off * off.saturating_sub(1);
             events += count;
@@ -208,7 +208,7 @@ impl Visits {
     }
 
     /// Adds up the counts of four cells each.
-    fn merge(&mut self) {
+    fn merge(&mut self, times: &mut [u16]) {
         let coarser = self.grid.coarser();
         for cell in 0..self.grid.len() {
             let (column, row) = (cell % self.grid.columns, cell / self.grid.columns);
@@ -216,8 +216,8 @@ impl Visits {
             let into = row / 2 * coarser.columns + column / 2;
             let count = core::mem::take(&mut self.ends[cell]);
             self.ends[into] += count;
-            let on = self.times.get_mut(cell).map_or(0, core::mem::take);
-            if let Some(sum) = self.times.get_mut(into) {
+            let on = times.get_mut(cell).map_or(0, core::mem::take);
+            if let Some(sum) = times.get_mut(into) {
                 *sum += on;
             }
         }
@@ -225,10 +225,10 @@ impl Visits {
     }
 
     /// The number of events, and with how many of its own polarity an event shares its cell on average.
-    fn filled(&self) -> (usize, f32) {
+    fn filled(&self, times: &[u16]) -> (usize, f32) {
         let company: f32 = (0..self.grid.len())
             .map(|cell| {
-                let times = self.of(cell);
+                let times = self.of(cell, times);
                 let on = times.iter().filter(|time| **time & 1 == 1).count() as f32;
                 let off = times.len() as f32 - on;
                 on * (on - 1.0) + off * (off - 1.0)
@@ -238,26 +238,33 @@ impl Visits {
         (usize::from(events), company / f32::from(events.max(1)))
     }
 
-    fn of(&self, cell: usize) -> &[u16] {
+    fn of<'t>(&self, cell: usize, times: &'t [u16]) -> &'t [u16] {
         let start = cell.checked_sub(1).map_or(0, |before| usize::from(self.ends[before]));
-        self.times.get(start..usize::from(self.ends[cell])).unwrap_or(&[])
+        times.get(start..usize::from(self.ends[cell])).unwrap_or(&[])
     }
 
     /// Adds the time differences of some cells to the histogram; `true` once all are in it. A cell and polarity counts as much as
     /// it has events, up to `most_weight`: 1 for all alike.
-    pub fn step(&mut self, lags: &mut [f32; LAGS], most_weight: usize) -> bool {
+    pub fn step(&mut self, lags: &mut [f32; LAGS], most_weight: usize, times: &[u16]) -> bool {
         let mut pairs = 0;
         while self.cell < self.grid.len() && pairs < PAIRS_A_STEP {
-            pairs += 8 + self.pair(self.cell, lags, most_weight);
+            pairs += 8 + self.pair(self.cell, lags, most_weight, times);
             self.cell += 1;
         }
         self.cell >= self.grid.len()
     }
 
     /// Adds the time differences of one cell; returns how many.
-    fn pair(&mut self, cell: usize, lags: &mut [f32; LAGS], most_weight: usize) -> usize {
-        let times = self.of(cell);
-        let stride = times.len().div_ceil(MOST_IN_CELL).max(1);
+    fn pair(
+        &mut self,
+        cell: usize,
+        lags: &mut [f32; LAGS],
+        most_weight: usize,
+        times: &[u16],
+    ) -> usize {
+        let most_in_cell = (most(times) / MOST_IN_CELL_SHARE).max(1);
+        let times = self.of(cell, times);
+        let stride = times.len().div_ceil(most_in_cell).max(1);
         let kept = || times.iter().copied().step_by(stride);
         let on = kept().filter(|time| time & 1 == 1).count();
         let counts = [kept().count() - on, on];
@@ -289,10 +296,10 @@ impl Visits {
     }
 
     /// Writes how often each cell is visited as weights, row by row: the root, so that what passes slowly still counts.
-    pub fn heat(&self, weights: &mut [u8]) {
+    pub fn heat(&self, weights: &mut [u8], times: &[u16]) {
         let roots: [u8; 256] = core::array::from_fn(|n| (16.0 * sqrt(n as f32)).min(255.0) as u8);
         for (cell, weight) in weights.iter_mut().enumerate().take(VISIT_CELLS) {
-            let events = self.of(cell).len();
+            let events = self.of(cell, times).len();
             *weight = if events >= LEAST_HEAT { roots[events.min(roots.len() - 1)] } else { 0 };
         }
     }
@@ -303,14 +310,14 @@ impl Visits {
     }
 
     /// Writes the power over chance of some cells at a frequency as weights, row by row; `true` once all are written.
-    pub fn map(&mut self, line_hz: f32, weights: &mut [u8]) -> bool {
+    pub fn map(&mut self, line_hz: f32, weights: &mut [u8], times: &[u16]) -> bool {
         let periods = line_hz * self.window_us as f32 * 1e-6;
         let per_tick = (periods * (1_u64 << (32 - TICKS_LOG2)) as f32) as u32;
         let cells = weights.len().min(VISIT_CELLS);
         let mut mapped = 0;
         while self.cell < cells && mapped < MAPPED_A_STEP {
             let mut sums = [Sum::default(); 2];
-            let times = self.of(self.cell);
+            let times = self.of(self.cell, times);
             for time in times {
                 let (sin, cos) = Turn(per_tick.wrapping_mul(u32::from(time >> 1))).sin_cos();
                 let sum = &mut sums[usize::from(time & 1)];
@@ -338,13 +345,13 @@ impl Visits {
 }
 
 /// How far a filling has got.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Filling {
     even: Even,
     /// Whether each cell's events were counted, and are placed now.
     counted: bool,
-    /// Events for which there is room.
-    left: usize,
+    /// Events counted or placed so far.
+    placed: usize,
 }
 
 impl Filling {
@@ -355,10 +362,9 @@ impl Filling {
     }
 }
 
-impl Default for Filling {
-    fn default() -> Self {
-        Self { even: Even::default(), counted: false, left: VISITS }
-    }
+/// Events that there is room for: no more than the ends of cells can tell.
+fn most(times: &[u16]) -> usize {
+    times.len().min(usize::from(u16::MAX))
 }
 
 /// When an event came, in parts of the window.

@@ -1,8 +1,7 @@
 //! Events of one rotor in polar coordinates about its centre.
 
-use heapless::Vec;
+use heapless::{Vec, VecView};
 
-use crate::limits::POLAR_EVENTS;
 use crate::math::{Turn, quick_sqrt};
 use crate::rotors::Disc;
 use crate::store::{Even, StoredEvent, Window};
@@ -104,8 +103,10 @@ impl PolarEvent {
     }
 }
 
-/// A rotor's events, evenly thinned to the capacity.
-pub type PolarTrack = Vec<PolarEvent, POLAR_EVENTS>;
+/// A rotor's events, evenly thinned to the capacity, whatever that is.
+pub type PolarTrack = VecView<PolarEvent>;
+/// The same with room for so many.
+pub type PolarEvents<const CAPACITY: usize> = Vec<PolarEvent, CAPACITY>;
 
 /// Fills `track` with the rotor's events of the window, a segment a call; `true` once all are in it.
 /// Cost: about 200 instructions for each event in the annulus.
@@ -117,7 +118,7 @@ pub fn track(window: &Window<'_>, disc: Disc, track: &mut PolarTrack, tracking: 
     }
     tracking.step(
         window,
-        POLAR_EVENTS,
+        track.capacity(),
         |event| annulus.place(event),
         |event, place| {
             track.push(PolarEvent::new(event, place, window.start_us, mid_us)).ok();

@@ -20,6 +20,8 @@ const RINGS: usize = 4;
 /// Least score of a symmetry, else the rotor has one part: twice what chance gives a single mark of so many events, one over their
 /// root. (Single marks of random scenes score 0.03 at most from a thousand events on, and 0.09 with two hundred.)
 const LEAST_SCORE: f32 = 2.0;
+/// Events beyond which what a single mark scores is no longer chance, but its shape.
+const MOST_CHANCE: u32 = 3_072;
 /// The largest count within this share of the best score wins: six blades also repeat like three and two.
 const CLOSE_TO_BEST: f32 = 0.85;
 /// Largest count that is tried: beyond [`MAX_BLADES`] only to say that it is beyond.
@@ -83,7 +85,7 @@ pub fn symmetry(angular: &AngularSums) -> Symmetry {
     }
     let best = scores.iter().copied().fold(0.0, f32::max);
     let events: u32 = angular.counts.iter().take(2 * RINGS).sum();
-    if best * best * (events as f32) < LEAST_SCORE * LEAST_SCORE {
+    if best * best * (events.min(MOST_CHANCE) as f32) < LEAST_SCORE * LEAST_SCORE {
         return Symmetry { parts: Some(1), score: best };
     }
     let parts = (2..=MOST_PARTS).rev().find(|n| scores[*n] >= CLOSE_TO_BEST * best).unwrap_or(1);

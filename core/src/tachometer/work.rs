@@ -1,8 +1,9 @@
 //! The memory that measuring works in.
 
+use crate::limits::{POLAR_EVENTS, VISITS};
 use crate::rotors::{Spectrum, extraction};
 use crate::speed::measurement::Bench;
-use crate::speed::polar::PolarTrack;
+use crate::speed::polar::PolarEvents;
 
 /// Memory that measuring works in, the same size everywhere.
 ///
@@ -10,7 +11,7 @@ use crate::speed::polar::PolarTrack;
 /// be what the stack is deepest for.
 #[derive(Debug)]
 pub struct Work {
-    pub(super) polar: PolarTrack,
+    pub(super) polar: PolarEvents<POLAR_EVENTS>,
     pub(super) spectrum: Spectrum,
     pub(super) scratch: Scratch,
 }
@@ -18,7 +19,7 @@ pub struct Work {
 impl Work {
     /// Nothing in it. All zeros, so that no image holds a copy of it.
     pub const EMPTY: Self = Self {
-        polar: PolarTrack::new(),
+        polar: PolarEvents::new(),
         spectrum: Spectrum::EMPTY,
         scratch: Scratch::Measure(Bench::EMPTY),
     };
@@ -38,15 +39,19 @@ impl Default for Work {
 #[expect(clippy::large_enum_variant, reason = "the larger one is the point: both share its memory")]
 pub(super) enum Scratch {
     Measure(Bench),
-    Search(extraction::Scratch),
+    Search {
+        scratch: extraction::Scratch,
+        /// Times of the events that are searched, where no more room is lent for them.
+        times: [u16; VISITS],
+    },
 }
 
 // Not inlined: through a reference of its own the compiler writes in place what it would build on the stack otherwise.
 impl Scratch {
     #[inline(never)]
     pub(super) fn ready_for_search(&mut self) {
-        if !matches!(self, Self::Search(_)) {
-            *self = Self::Search(extraction::Scratch::default());
+        if !matches!(self, Self::Search { .. }) {
+            *self = Self::Search { scratch: extraction::Scratch::default(), times: [0; VISITS] };
         }
     }
 
@@ -54,7 +59,7 @@ impl Scratch {
     pub(super) fn ready_for_measuring(&mut self) {
         match self {
             Self::Measure(bench) => bench.clear(),
-            Self::Search(_) => *self = Self::Measure(Bench::EMPTY),
+            Self::Search { .. } => *self = Self::Measure(Bench::EMPTY),
         }
     }
 }

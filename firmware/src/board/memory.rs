@@ -50,6 +50,7 @@ pub fn tachometer() -> &'static mut Tachometer<'static> {
         heat: HEAT.take(),
         weights: WEIGHTS.take(),
         work: WORK.take(),
+        more: None,
     };
     // The first block tells the sensor's size, and the tachometer is set to it.
     let size = Geometry { width_px: 320, height_px: 320 };

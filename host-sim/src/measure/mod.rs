@@ -9,15 +9,19 @@ mod ties;
 use std::borrow::Cow;
 
 use evtach_core::Ignored;
-use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
+use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS, POLAR_EVENTS, VISITS};
+use evtach_core::speed::polar::PolarEvents;
 use evtach_core::{
-    Event, GyroSample, Memory, Poll, Reading, Settings, StoredEvent, Tachometer, Work,
+    Event, GyroSample, Memory, More, Poll, Reading, Settings, StoredEvent, Tachometer, Work,
 };
 
 pub use json::{Document, FileFacts, ReadingRow, RotorRow, letter};
 pub use summary::{Summary, summarise};
 pub use table::{evidence, table};
 pub use ties::Ties;
+
+/// A PC's second search looks at so many times as many events as the device's search.
+const MORE: usize = 8;
 
 /// How much memory the tachometer is lent: the only difference between device and PC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
@@ -70,8 +74,19 @@ pub fn with_tachometer<R>(
     let mut heat = vec![0_u16; capacity.heat_cells()];
     let mut weights = vec![0_u8; capacity.heat_cells()];
     let mut bench = Box::new(Work::EMPTY);
-    let memory =
-        Memory { events: &mut events, heat: &mut heat, weights: &mut weights, work: &mut bench };
+    let mut times = vec![0_u16; MORE * VISITS];
+    let mut track = Box::new(PolarEvents::<{ MORE * POLAR_EVENTS }>::new());
+    let more = match capacity {
+        Capacity::Device => None,
+        Capacity::Full => Some(More { times: &mut times, track: track.as_mut_view() }),
+    };
+    let memory = Memory {
+        events: &mut events,
+        heat: &mut heat,
+        weights: &mut weights,
+        work: &mut bench,
+        more,
+    };
     work(&mut Tachometer::new(settings, memory))
 }
 

@@ -24,7 +24,7 @@ impl Extraction {
     /// Fills the map of the line at hand.
     pub(super) fn map(&mut self, view: &mut View<'_>, scratch: &mut Scratch) {
         let Some(weights) = view.weights.get_mut(..self.grid.len()) else { return self.end() };
-        if scratch.visits.map(self.line.hz, weights) {
+        if scratch.visits.map(self.line.hz, weights, view.times) {
             self.stage = Stage::Judge;
         }
     }

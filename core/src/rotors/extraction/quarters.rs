@@ -2,7 +2,7 @@
 
 use super::{Extraction, Scratch, Stage, View};
 use crate::event::Geometry;
-use crate::limits::{MAX_LINES, VISIT_CELLS, VISITS};
+use crate::limits::{MAX_LINES, VISIT_CELLS};
 use crate::rotors::heat::CellGrid;
 use crate::rotors::lines::{Line, Spectrum};
 use crate::rotors::visits::{COARSEST_LOG2, Filling};
@@ -36,7 +36,7 @@ impl Extraction {
     /// Collects what is outside the rotors found so far.
     pub(super) fn visits(
         &mut self,
-        view: &View<'_>,
+        view: &mut View<'_>,
         spectrum: &mut Spectrum,
         scratch: &mut Scratch,
     ) {
@@ -56,10 +56,11 @@ impl Extraction {
                     self.grid = self.grid.coarser();
                 }
             }
-            return self.start_filling(scratch);
+            return self.start_filling(view, scratch);
         };
         let least_company = if self.quarter == 0 { LEAST_COMPANY } else { HOPELESS_COMPANY };
-        let filled = scratch.visits.fill(&view.window, &self.taken, filling, least_company);
+        let View { window, times, .. } = view;
+        let filled = scratch.visits.fill(window, &self.taken, filling, least_company, times);
         let most_events = filling.most_events();
         if filled.map(|(events, _)| events).or(most_events).is_some_and(|most| most < LEAST_EVENTS)
         {
@@ -78,7 +79,7 @@ impl Extraction {
             return self.other_cells();
         }
         if self.quarter == 0 {
-            let crowded = events > VISITS / 4 * 3 || self.grid.cell_log2 == COARSEST_LOG2;
+            let crowded = events > view.times.len() / 4 * 3 || self.grid.cell_log2 == COARSEST_LOG2;
             let least_log2 = self.grid.cell_log2.saturating_sub(u8::from(crowded)).max(2);
             let first = self.least_log2 == 0;
             self.least_log2 = if first { least_log2 } else { least_log2.min(self.least_log2) };
@@ -97,21 +98,21 @@ impl Extraction {
         }
     }
 
-    pub(super) fn start_filling(&mut self, scratch: &mut Scratch) {
-        scratch.visits.clear(self.grid);
+    pub(super) fn start_filling(&mut self, view: &mut View<'_>, scratch: &mut Scratch) {
+        scratch.visits.clear(self.grid, view.times);
         self.filling = Some(Filling::default());
     }
 
-    pub(super) fn lags(&mut self, spectrum: &mut Spectrum, scratch: &mut Scratch) {
+    pub(super) fn lags(&mut self, view: &View<'_>, spectrum: &mut Spectrum, scratch: &mut Scratch) {
         let most_weight = if self.quarter == 0 { 1 } else { MOST_WEIGHT };
-        if scratch.visits.step(spectrum.lags(), most_weight) {
+        if scratch.visits.step(spectrum.lags(), most_weight, view.times) {
             self.stage = Stage::Spectrum;
         }
     }
 
     pub(super) fn spectrum(
         &mut self,
-        view: &View<'_>,
+        view: &mut View<'_>,
         spectrum: &mut Spectrum,
         scratch: &mut Scratch,
     ) {
@@ -121,7 +122,7 @@ impl Extraction {
             && too_fine
             && let Some(mut filling) = self.filled.take()
         {
-            scratch.visits.place_in_coarser(&mut filling);
+            scratch.visits.place_in_coarser(&mut filling, view.times);
             self.filling = Some(filling);
             // Finer ones were tried.
             self.finer = true;

@@ -15,14 +15,15 @@ const BESIDE: f32 = 0.5;
 
 impl Extraction {
     /// Where nothing passes anywhere twice, what turns slowly is looked for in the middle of all that moves.
-    pub(super) fn moving(&mut self, view: &View<'_>, scratch: &mut Scratch) {
+    pub(super) fn moving(&mut self, view: &mut View<'_>, scratch: &mut Scratch) {
         let Some(filling) = &mut self.filling else {
             if self.grid.is_empty() {
                 self.grid = view.grid;
             }
-            return self.start_filling(scratch);
+            return self.start_filling(view, scratch);
         };
-        if scratch.visits.fill(&view.window, &[], filling, LEAST_COMPANY).is_none() {
+        let View { window, times, .. } = view;
+        if scratch.visits.fill(window, &[], filling, LEAST_COMPANY, times).is_none() {
             return;
         }
         self.filling = None;
@@ -31,7 +32,8 @@ impl Extraction {
     }
 
     pub(super) fn heat(&mut self, view: &mut View<'_>, scratch: &Scratch) {
-        scratch.visits.heat(view.weights.get_mut(..self.grid.len()).unwrap_or_default());
+        let weights = view.weights.get_mut(..self.grid.len()).unwrap_or_default();
+        scratch.visits.heat(weights, view.times);
         self.looked_for = For::Slow;
         self.stage = Stage::Seed;
     }
