@@ -4,7 +4,7 @@ use super::coherence::Phasor;
 use super::disc::Disc;
 use super::extraction::Found;
 use super::winding::{Explainer, Winding};
-use crate::math::{TAU, sqrt};
+use crate::math::{TAU, larger, sqrt};
 
 /// Least share of its disc that a rotor's phasors cover: a mark on a rim sweeps a fifth.
 const LEAST_COVER: f32 = 0.08;
@@ -49,13 +49,15 @@ pub fn believe(explainer: &Explainer, line_hz: f32) -> Option<Found> {
     let radius_px = rim(region, &axis);
     let disc_px2 = core::f32::consts::PI * radius_px * radius_px;
     // Both polarities of a cell are phasors of their own.
-    let covers = |cell_px: f32| 0.5 * total as f32 * cell_px * cell_px > LEAST_COVER * disc_px2;
-    (believed && explainer.cell_px().is_none_or(covers)).then(|| Found {
+    let in_phasors = |cell_px: f32| 0.5 * total as f32 * cell_px * cell_px / larger(disc_px2, 1.0);
+    let cover = explainer.cell_px().map_or(1.0, in_phasors);
+    (believed && cover > LEAST_COVER).then(|| Found {
         disc: Disc { radius_px, ..axis },
         omega_rad_s: line_hz * TAU / windings as f32,
         windings: windings.unsigned_abs(),
         line_hz,
         share,
+        cover,
         explained: share * region.iter().map(|p| p.amplitude).sum::<f32>() * thinned,
         ..Found::default()
     })

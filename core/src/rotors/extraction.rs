@@ -54,6 +54,8 @@ pub struct Found {
     pub line_hz: f32,
     /// Share of the coherence map it explains.
     pub share: f32,
+    /// Share of its disc that the map covers, counted in cells: above 1 where these are coarse.
+    pub cover: f32,
     /// Events in step that it explains.
     pub explained: f32,
     /// How it is tilted, once that was asked.

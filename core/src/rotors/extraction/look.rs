@@ -1,6 +1,6 @@
 //! A look at what keeps step with a line: which rotation explains it.
 
-use super::{Extraction, For, Scratch, Stage, View};
+use super::{Extraction, For, Found, Scratch, Stage, View};
 use crate::limits::WINDING_PHASORS;
 use crate::math::{TAU, TurnRate, sqrt};
 use crate::rotors::belief::{LEAST_PHASORS, believe, inside};
@@ -13,12 +13,25 @@ use crate::store::{Even, StoredEvent};
 const LOCAL_SHARE: f32 = 1.25;
 /// A rotation that explains this share of the whole map makes k = 1.
 const SHARE_OF_ONE: f32 = 0.75;
+/// But where no more than this share of its disc is covered, its parts are asked first: of a disc around rotors that stand far apart
+/// they cover no more, and what few cells show fits many a rotation.
+const SPARSE: f32 = 0.2;
 /// Events of a cell and polarity that a phase is taken from.
 const EVENTS_A_PHASE: f32 = 8.0;
 /// Largest side of a cell in radii: the phase of eight blades turns once in 0.8 radii at the rim.
 const MOST_CELL_SHARE: f32 = 0.3;
 /// Cells with a phase below which a disc in a quarter is also looked at event by event.
 const FEW_PHASORS: usize = 32;
+
+/// Whether what was found covers so little of its disc that it may be several rotors.
+fn is_sparse(found: &Found) -> bool {
+    found.cover < SPARSE
+}
+
+/// Whether what was found in the whole picture, or in a part of it, is one rotor for all that is known.
+pub(super) fn is_one(found: &Found) -> bool {
+    found.share >= SHARE_OF_ONE || !is_sparse(found)
+}
 
 impl Extraction {
     /// Fills the map of the line at hand.
@@ -162,7 +175,7 @@ impl Extraction {
         }
         self.whole = believe(&scratch.explainer, self.line.hz);
         if let Some(whole) = self.whole
-            && (whole.share >= SHARE_OF_ONE || self.quarter > 0)
+            && (whole.share >= SHARE_OF_ONE && !is_sparse(&whole) || self.quarter > 0)
         {
             self.take(whole);
             self.stage = Stage::Visits;
@@ -179,6 +192,7 @@ impl Extraction {
             self.stage = Stage::Line;
             return;
         }
+        self.whole = self.whole.filter(is_one);
         self.k = 2;
         self.best.clear();
         self.best_index = f32::MAX;

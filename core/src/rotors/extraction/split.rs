@@ -1,5 +1,6 @@
 //! A map that no single rotation explains, taken apart by K-means.
 
+use super::look::is_one;
 use super::{Clustering, Extraction, For, Scratch, Stage, View};
 use crate::limits::MAX_CLUSTERS;
 use crate::rotors::belief::believe;
@@ -95,7 +96,7 @@ impl Extraction {
     /// One step of the look for the rotation of one cluster.
     pub(super) fn part(&mut self, scratch: &mut Scratch) {
         if scratch.explainer.step() {
-            if let Some(one) = believe(&scratch.explainer, self.line.hz) {
+            if let Some(one) = believe(&scratch.explainer, self.line.hz).filter(is_one) {
                 self.parts.push(one).ok();
             }
             self.next_part();
