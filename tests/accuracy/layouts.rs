@@ -318,6 +318,39 @@ fn without_polarity() {
     all_read("all ON", &Scene { sensor, ..scene(75, rotors) });
 }
 
+/// Both edges of a blade as wide as its gap cancel in its harmonic, and a hand blurs what is left of it.
+#[test]
+fn without_polarity_in_the_hand() {
+    let camera =
+        Camera { tremor_px: 1.74, tremor_mrad: 1.74, drift_px_s: [-0.8, 9.6], ..Camera::default() };
+    let sensor = Sensor {
+        all_on: true,
+        refractory_us: 470.0,
+        latency_spread_us: 15.0,
+        blur_px: 0.88,
+        ..Sensor::default()
+    };
+    let rotor = Rotor {
+        blades: 6,
+        shape: Shape::Swept,
+        odd_width: 0.63,
+        tilt_deg: 20.0,
+        tilt_axis_deg: 82.0,
+        contrast: -1.19,
+        ..at(225.0, 210.0, 20.0, -1544.0)
+    };
+    for seed in [1, 3] {
+        let scene = Scene {
+            model: Model::Threshold,
+            duration_ms: 223.0,
+            camera: camera.clone(),
+            sensor: sensor.clone(),
+            ..scene(seed, vec![rotor.clone()])
+        };
+        all_read("all ON in the hand", &scene);
+    }
+}
+
 /// Lamps of both mains, with overtones, over the whole picture: a rotor keeps its speed, and without one there is none.
 #[test]
 fn flicker_neither_bends_a_speed_nor_makes_one() {

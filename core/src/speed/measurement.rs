@@ -96,6 +96,8 @@ pub struct Measurement {
     doubt: Option<Doubt>,
     disc: Disc,
     omega_rad_s: f32,
+    /// Whether few of its events keep step.
+    faint: bool,
     /// Angular harmonic whose phase is followed.
     harmonic: u32,
     tilt: Option<Tilt>,
@@ -133,6 +135,7 @@ impl Measurement {
             doubt: None,
             disc: found.disc,
             omega_rad_s: found.omega_rad_s,
+            faint: false,
             harmonic: found.windings,
             pose: Pose::new(found.disc, found.omega_rad_s, 1, found.windings, 0),
             tilt: found.tilt,
@@ -309,8 +312,9 @@ impl Measurement {
         });
         let knot = self.pose.path().at(0.0);
         let (x_px, y_px) = (self.disc.x_px + knot.x_px, self.disc.y_px + knot.y_px);
+        let nothing = self.faint && self.status == Status::Refused(Reason::Ambiguous);
         Outcome {
-            status: self.status,
+            status: if nothing { Status::Refused(Reason::NoRotation) } else { self.status },
             found: Found {
                 disc: Disc { x_px, y_px, ..self.disc },
                 omega_rad_s: self.omega_rad_s,

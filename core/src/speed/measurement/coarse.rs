@@ -66,6 +66,7 @@ impl Measurement {
         if coherence < self.least_coherence() {
             return self.refuse(Reason::NoRotation);
         }
+        self.faint = self.is_faint(coherence);
         self.turn = 0;
         self.stage = Stage::Scan;
     }

@@ -11,7 +11,9 @@ use crate::store::Window;
 use crate::tachometer::BASE_WINDOW_US;
 
 /// A rotor keeps at least this share of its events in step, if they have no jitter.
-const LEAST_COHERENCE: f32 = 0.3;
+const LEAST_COHERENCE: f32 = 0.2;
+/// One of fewer than so many times that is faint: unless it is read, nothing says that it turns.
+const FAINT: f32 = 1.5;
 /// Blur of the rotor's edges, as a share of its radius and in pixels for a small one, beyond which they are no edges;
 /// and within which they are so sharp that a registration that went astray does not count against them.
 const MOST_BLUR: (f32, f32) = (0.1, 1.5);
@@ -189,6 +191,11 @@ impl Measurement {
         // exp(-x^2 / 2) to a few percent, and never zero.
         let kept = 1.0 / (1.0 + 0.25 * scatter_rad * scatter_rad);
         LEAST_COHERENCE * kept * kept
+    }
+
+    /// Whether so few events keep step that only a reading shows a rotor.
+    pub(super) fn is_faint(&self, coherence: f32) -> bool {
+        coherence < FAINT * self.least_coherence()
     }
 
     /// Whether the rotor has edges: what merely keeps step with one frequency has none, and a wrong harmonic about a wrong
