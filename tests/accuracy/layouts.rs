@@ -275,6 +275,30 @@ fn small_rotors_with_many_blades_in_a_trembling_hand() {
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
 }
 
+/// What shows about a hundredth of the events, and a neighbour of its harmonic that keeps step about another centre.
+#[test]
+fn a_small_slow_one_before_a_busy_wall_in_the_hand() {
+    let camera =
+        Camera { tremor_px: 2.7, tremor_mrad: 2.7, drift_px_s: [5.6, -9.4], ..Camera::default() };
+    let background = Background { contrast: 0.373, ..wall() };
+    let sensor = Sensor { blur_px: 0.88, latency_spread_us: 15.0, ..Sensor::default() };
+    let mut wrong = Vec::new();
+    for seed in 1..=3 {
+        let rotor = Rotor { blades: 5, shape: Shape::Tapered, ..at(171.0, 114.0, 24.0, 300.0) };
+        let scene = Scene {
+            model: Model::Threshold,
+            duration_ms: 450.0,
+            camera: camera.clone(),
+            background: background.clone(),
+            sensor: sensor.clone(),
+            ..wide(seed, vec![rotor])
+        };
+        let measured = run(&scene, Capacity::Full);
+        wrong.extend(measured.wrong_speeds(&format!("seed {seed}"), true));
+    }
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+}
+
 /// More parts than are named: the speed, and no blade count.
 #[test]
 fn nine_eleven_and_sixteen_spokes() {

@@ -36,6 +36,9 @@ const MOST_CLEAR_DEVIATION: f32 = 0.35 * FRACTION;
 /// Witnesses of the lock may differ by this much, or by eight standard errors.
 const LOCK_AGREEMENT: f32 = 2e-3;
 const LOCK_SIGMAS: f32 = 8.0;
+/// The refinement may differ from them by this much, or by five standard errors: the next harmonic of eight would by a ninth.
+const REFINED_AGREEMENT: f32 = 0.04;
+const REFINED_SIGMAS: f32 = 5.0;
 /// A lock with a larger relative error is only coarse.
 const MOST_LOCK_SIGMA: f32 = 3e-3;
 /// Relative error to which a lock is believed whatever the phase's is.
@@ -102,7 +105,7 @@ impl Measurement {
             let sharp = both.sigma_rad_s.max(held_up * both.omega_rad_s.abs())
                 < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
             let long = self.wanted_us <= 1.02 * window.duration_us as f32;
-            if !self.bears_out(lock, Some(phase)) {
+            if !self.bears_out(lock, Some(phase)) || self.refinement_denies(phase.omega_rad_s) {
                 self.status = Status::Refused(Reason::Ambiguous);
             } else if sharp && long {
                 self.estimate = combine(witness, phase, USUAL_SIGMAS);
@@ -161,6 +164,18 @@ impl Measurement {
             let most = LOCK_SIGMAS * sqrt(a * a + b * b);
             apart < (LOCK_AGREEMENT * lock.omega_rad_s.abs()).max(most) && self.fits_between()
         })
+    }
+
+    /// Whether the refinement, which knows nothing of harmonics, saw another speed: about a wrong centre a neighbour of the right
+    /// harmonic keeps step, and leads the lock to its own speed.
+    fn refinement_denies(&self, omega_rad_s: f32) -> bool {
+        let (Some(refined), Some(sigma)) =
+            (self.evidence.refined_rad_s, self.evidence.refined_sigma_rad_s)
+        else {
+            return false;
+        };
+        let most = (REFINED_SIGMAS * sigma).max(REFINED_AGREEMENT * omega_rad_s.abs());
+        (refined - omega_rad_s).abs() > most
     }
 
     /// Whether jitter may scatter the blades' edges over so much of their distance that a registration matches noise: no overtone is
