@@ -83,7 +83,11 @@ impl Tachometer<'_> {
         if !goes_on {
             self.fade(WINDOW_SEGMENTS);
         }
-        self.satisfied = status == Some(Status::Locked);
+        let locked = status == Some(Status::Locked);
+        let window_us = segment_us(self.target_us) * WINDOW_SEGMENTS as u32;
+        // Not where another rotor would have been read in a longer one.
+        let wants_more = |o: &Outcome| o.status != Status::Locked && o.wanted_us > window_us as f32;
+        self.satisfied = locked && !self.outcomes.iter().any(wants_more);
         if self.outcomes.iter().any(|outcome| outcome.status != Status::Locked) {
             self.until_search = self.until_search.min(SEARCH_AGAIN);
         }
@@ -92,13 +96,12 @@ impl Tachometer<'_> {
             self.begin_anew(self.last_us);
             return;
         }
-        if caught_up && !self.satisfied && self.is_behind() {
+        if caught_up && !locked && self.is_behind() {
             // Else a rotor that does not lock in long windows would never be seen in a short one again.
             let segment_us = segment_us(self.target_us);
             self.ignored.overrun += self.store.restart(self.last_us, segment_us);
             return;
         }
-        let window_us = segment_us(self.target_us) * WINDOW_SEGMENTS as u32;
         let mut wanted = self.outcomes.iter().map(|o| o.wanted_us).fold(0.0, f32::max);
         let refused = status.and_then(Status::reason).is_some();
         if refused && !caught_up {
