@@ -36,8 +36,9 @@ const MOST_CLEAR_DEVIATION: f32 = 0.35 * FRACTION;
 /// Witnesses of the lock may differ by this much, or by eight standard errors.
 const LOCK_AGREEMENT: f32 = 2e-3;
 const LOCK_SIGMAS: f32 = 8.0;
-/// The refinement may differ from them by this much, or by five standard errors: the next harmonic of eight would by a ninth.
-const REFINED_AGREEMENT: f32 = 0.04;
+/// The refinement may differ from them by this much, or by five standard errors: the next harmonic of eight would by a ninth, and thin
+/// slices of a fast rotor that is looked at from aside fall short by a twentieth.
+const REFINED_AGREEMENT: f32 = 0.1;
 const REFINED_SIGMAS: f32 = 5.0;
 /// A lock with a larger relative error is only coarse.
 const MOST_LOCK_SIGMA: f32 = 3e-3;
