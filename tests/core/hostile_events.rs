@@ -3,8 +3,10 @@
 //! The test profile checks overflow of integers.
 #![allow(clippy::panic)] // A test fails by it.
 
+use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS, POLAR_EVENTS};
+use evtach_core::speed::polar::PolarEvents;
 use evtach_core::{
-    Event, Geometry, GyroSample, Memory, Polarity, Poll, Reading, Roi, Settings, StoredEvent,
+    Event, Geometry, GyroSample, Memory, More, Polarity, Poll, Reading, Roi, Settings, StoredEvent,
     Tachometer, Work,
 };
 use proptest::collection::vec;
@@ -140,16 +142,44 @@ fn check(reading: &Reading) {
     }
 }
 
-fn play(settings: Settings, inputs: &[Input], store_events: usize, heat_cells: usize) {
-    let mut events = vec![StoredEvent::default(); store_events];
-    let (mut heat, mut weights) = (vec![0; heat_cells], vec![0; heat_cells]);
+/// How much memory is lent.
+#[derive(Clone, Copy, Debug)]
+struct Room {
+    store_events: usize,
+    heat_cells: usize,
+    /// Times that a search has more room for, where that is lent.
+    more_times: Option<usize>,
+}
+
+/// The device's.
+const USUAL: Room =
+    Room { store_events: DEVICE_EVENTS, heat_cells: DEVICE_HEAT_CELLS, more_times: None };
+
+fn room() -> impl Strategy<Value = Room> {
+    let store_events = prop_oneof![Just(USUAL.store_events), 0..2_000_usize];
+    let heat_cells = prop_oneof![Just(USUAL.heat_cells), 0..500_usize];
+    let more_times =
+        prop_oneof![Just(None), Just(Some(50_000_usize)), (0..2_000_usize).prop_map(Some)];
+    (store_events, heat_cells, more_times).prop_map(|(store_events, heat_cells, more_times)| Room {
+        store_events,
+        heat_cells,
+        more_times,
+    })
+}
+
+fn play(settings: Settings, inputs: &[Input], room: Room) {
+    let mut events = vec![StoredEvent::default(); room.store_events];
+    let (mut heat, mut weights) = (vec![0; room.heat_cells], vec![0; room.heat_cells]);
     let mut work = Box::new(Work::EMPTY);
+    let mut times = vec![0; room.more_times.unwrap_or(0)];
+    let mut track = Box::new(PolarEvents::<{ 2 * POLAR_EVENTS }>::new());
+    let more = room.more_times.map(|_| More { times: &mut times, track: track.as_mut_view() });
     let memory = Memory {
         events: &mut events,
         heat: &mut heat,
         weights: &mut weights,
         work: &mut work,
-        more: None,
+        more,
     };
     let mut tachometer = Tachometer::new(settings, memory);
     let mut readings = Vec::new();
@@ -184,10 +214,9 @@ proptest! {
     fn never_panics(
         settings in settings(),
         inputs in vec(input(), 0..12),
-        store_events in prop_oneof![Just(16_384_usize), 0..2_000_usize],
-        heat_cells in prop_oneof![Just(6_400_usize), 0..500_usize],
+        room in room(),
     ) {
-        play(settings, &inputs, store_events, heat_cells);
+        play(settings, &inputs, room);
     }
 }
 
@@ -200,7 +229,8 @@ fn ends_of_time() {
             .iter()
             .map(|t_us| Event { t_us: *t_us, x: 5, y: 5, polarity: Polarity::On })
             .collect();
-        play(settings, &[Input::Events(events), Input::Finish], 4_096, 2_500);
+        let room = Room { store_events: 4_096, ..USUAL };
+        play(settings, &[Input::Events(events), Input::Finish], room);
     };
     at(&[u64::MAX]);
     at(&[0, u64::MAX]);
@@ -231,8 +261,7 @@ fn a_mad_gyro_is_not_believed() {
                 mad,
                 Input::Events(inputs[30_000..].to_vec()),
             ],
-            16_384,
-            2_500,
+            USUAL,
         );
     }
 }

@@ -8,11 +8,10 @@ use embassy_futures::join::join;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_sync::zerocopy_channel::{Channel, Receiver};
 use embedded_hal_async::spi::{ErrorType, Operation, SpiDevice};
-use evtach_core::Ignored;
-use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
-use evtach_core::{Event, Geometry, Memory, Polarity, Settings, StoredEvent, Tachometer, Work};
+use evtach_core::{Event, Geometry, Ignored, Polarity, Settings, Tachometer};
 use evtach_firmware::intake::{BLOCKS, Block, Pace};
 use evtach_firmware::sensor::spi::{Acquired, AlwaysReady, Bridge, Kind, Lost, SpiSensor, acquire};
+use evtach_host::measure::{Capacity, with_tachometer};
 
 const GEOMETRY: Geometry = Geometry { width_px: 320, height_px: 320 };
 
@@ -136,19 +135,11 @@ struct Measured {
 }
 
 /// Measures as a processor does that has time for one step every two milliseconds.
-async fn measure(mut blocks: Receiver<'_, NoopRawMutex, Block>) -> Measured {
+async fn measure(
+    tachometer: &mut Tachometer<'_>,
+    mut blocks: Receiver<'_, NoopRawMutex, Block>,
+) -> Measured {
     const BLOCKS_A_STEP: u64 = 16;
-    let mut events = vec![StoredEvent::default(); DEVICE_EVENTS];
-    let (mut heat, mut weights) = (vec![0; DEVICE_HEAT_CELLS], vec![0; DEVICE_HEAT_CELLS]);
-    let mut work = Box::new(Work::EMPTY);
-    let memory = Memory {
-        events: &mut events,
-        heat: &mut heat,
-        weights: &mut weights,
-        work: &mut work,
-        more: None,
-    };
-    let mut tachometer = Tachometer::new(Settings::new(GEOMETRY), memory);
     let mut measured = Measured::default();
     for number in 1_u64.. {
         let block = blocks.receive().await;
@@ -181,10 +172,11 @@ fn a_minute_at_1_mev_s_with_one_frame_in_a_hundred_damaged() {
     let mut sender = Sender::new();
     let mut acquired = Acquired::default();
     let mut sensor = SpiSensor::new(&mut sender, AlwaysReady);
-    let (end, measured) = block_on(join(
-        acquire(&mut sensor, Pace::File, &mut blocks, |now| acquired = *now),
-        measure(receiver),
-    ));
+    let acquiring = acquire(&mut sensor, Pace::File, &mut blocks, |now| acquired = *now);
+    let (end, measured) =
+        with_tachometer(Settings::new(GEOMETRY), Capacity::Device, |tachometer| {
+            block_on(join(acquiring, measure(tachometer, receiver)))
+        });
     end.expect("a bus that works");
     let Acquired { account, thinned, overrun, .. } = acquired;
     let Ignored { out_of_bounds, out_of_roi, out_of_order, overrun: too_late } = measured.ignored;

@@ -12,10 +12,7 @@ use embassy_time::{Duration, MockDriver, Timer};
 use embassy_usb_driver::Speed;
 use embassy_usb_host::BusState;
 use evtach_core::decode::{Davis, Dvxplorer, Mounting};
-use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS};
-use evtach_core::{
-    Event, Frame, GyroSample, Memory, Reading, Settings, Status, StoredEvent, Tachometer, Work,
-};
+use evtach_core::{Event, Frame, GyroSample, Reading, Settings, Status};
 use evtach_firmware::cost::{Costs, Spent};
 use evtach_firmware::intake::{BLOCKS, Block, Pace};
 use evtach_firmware::measure::{Companion, measure};
@@ -23,7 +20,7 @@ use evtach_firmware::sensor::usb::emulated::{
     Act, Camera, DavisWords, Device, DvxplorerWords, GyroRange, World, swinging,
 };
 use evtach_firmware::sensor::usb::{Acquired, Model, acquire};
-use evtach_host::measure::{Capacity, measure_events};
+use evtach_host::measure::{Capacity, measure_events, with_tachometer};
 use evtach_host::synth::{self, Rotor, Scene};
 
 /// Time that passes when everything waits, and behind each step of the measurement: thousands of these in a search.
@@ -67,22 +64,10 @@ fn read_over_usb(
     let mut buffers = [const { Block::EMPTY }; BLOCKS];
     let mut channel = Channel::<NoopRawMutex, _>::new(&mut buffers);
     let (mut sender, mut receiver) = channel.split();
-    let mut store = vec![StoredEvent::default(); DEVICE_EVENTS];
-    let (mut heat, mut weights) = (vec![0; DEVICE_HEAT_CELLS], vec![0; DEVICE_HEAT_CELLS]);
-    let mut work = Box::new(Work::EMPTY);
-    let memory = Memory {
-        events: &mut store,
-        heat: &mut heat,
-        weights: &mut weights,
-        work: &mut work,
-        more: None,
-    };
-    let mut tachometer = Tachometer::new(Settings::new(model.geometry()), memory);
     let mut readings = Readings::default();
     let mut acquired = Acquired::NONE;
     let (mut costs, looking) = (Costs::new(()), port.clone());
     let acquiring = acquire(port, state, &mut sender, u32::MAX, |now| acquired = *now);
-    let measuring = measure(&mut tachometer, &mut receiver, Pace::Live, &mut costs, &mut readings);
     let watching = async {
         while !looking.0.borrow().camera().is_some_and(Camera::is_done) {
             Timer::after_millis(1).await;
@@ -90,7 +75,10 @@ fn read_over_usb(
         // What is in the blocks is measured.
         Timer::after_millis(200).await;
     };
-    block_on(select(watching, select(acquiring, measuring)));
+    with_tachometer(Settings::new(model.geometry()), Capacity::Device, |tachometer| {
+        let measuring = measure(tachometer, &mut receiver, Pace::Live, &mut costs, &mut readings);
+        block_on(select(watching, select(acquiring, measuring)))
+    });
     (readings.0, acquired)
 }
 
