@@ -4,7 +4,7 @@ use super::coherence::Phasor;
 use super::disc::Disc;
 use super::extraction::Found;
 use super::winding::{Explainer, Winding};
-use crate::math::{TAU, larger, sqrt};
+use crate::math::{TAU, larger};
 
 /// Least share of its disc that a rotor's phasors cover: a mark on a rim sweeps a fifth.
 const LEAST_COVER: f32 = 0.08;
@@ -24,9 +24,8 @@ const MOST_OFF_CENTRE: f32 = 0.7;
 
 /// Whether a phasor belongs to a disc.
 pub fn inside(phasor: &Phasor, part: &Disc) -> bool {
-    let (dx, dy) = (phasor.x_px - part.x_px, phasor.y_px - part.y_px);
-    let reach = 1.2 * part.radius_px;
-    dx * dx + dy * dy < reach * reach
+    let reach_px = 1.2 * part.radius_px;
+    phasor.distance2(part) < reach_px * reach_px
 }
 
 /// A rotor, when the winding is one to be believed.
@@ -46,10 +45,12 @@ pub fn believe(explainer: &Explainer, line_hz: f32) -> Option<Found> {
         && share >= least_share
         && share - share_in_step >= LEAST_LEAD
         && part.distance2(&axis) <= off_centre * off_centre;
-    let radius_px = rim(region, &axis);
+    let radius_px = explainer.rim_px();
     let disc_px2 = core::f32::consts::PI * radius_px * radius_px;
+    let covering = region.iter().filter(|p| p.distance2(&axis) < radius_px * radius_px).count();
     // Both polarities of a cell are phasors of their own.
-    let in_phasors = |cell_px: f32| 0.5 * total as f32 * cell_px * cell_px / larger(disc_px2, 1.0);
+    let in_phasors =
+        |cell_px: f32| 0.5 * covering as f32 * thinned * cell_px * cell_px / larger(disc_px2, 1.0);
     let cover = explainer.cell_px().map_or(1.0, in_phasors);
     (believed && cover > LEAST_COVER).then(|| Found {
         disc: Disc { radius_px, ..axis },
@@ -61,22 +62,4 @@ pub fn believe(explainer: &Explainer, line_hz: f32) -> Option<Found> {
         explained: share * region.iter().map(|p| p.amplitude).sum::<f32>() * thinned,
         ..Found::default()
     })
-}
-
-/// Distance from the axis within which 95 % of the events in step lie.
-fn rim(region: &[Phasor], axis: &Disc) -> f32 {
-    let distance = |phasor: &Phasor| {
-        let (dx, dy) = (phasor.x_px - axis.x_px, phasor.y_px - axis.y_px);
-        sqrt(dx * dx + dy * dy)
-    };
-    let total: f32 = region.iter().map(|p| p.amplitude).sum();
-    let (mut low, mut high) = (0.0_f32, 2048.0_f32);
-    // Bisection instead of a sort: the region is not ours to reorder.
-    for _ in 0..12 {
-        let middle = 0.5 * (low + high);
-        let within: f32 =
-            region.iter().filter(|p| distance(p) <= middle).map(|p| p.amplitude).sum();
-        if within < 0.95 * total { low = middle } else { high = middle }
-    }
-    high
 }

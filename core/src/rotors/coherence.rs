@@ -4,6 +4,7 @@
 //! rotors do not. Weighing cells by how much of their events keeps step separates a rotor from all of these,
 //! which counts alone cannot do.
 
+use super::disc::Disc;
 use crate::event::Geometry;
 use crate::limits::{COHERENCE_CELLS, COHERENCE_COLUMNS};
 use crate::math::{TAU, TurnRate, sqrt};
@@ -29,6 +30,15 @@ pub struct Phasor {
     pub amplitude: f32,
     /// Whether the events are ON events.
     pub on: bool,
+}
+
+impl Phasor {
+    /// Squared distance from a disc's centre in pixels.
+    #[must_use]
+    pub fn distance2(&self, disc: &Disc) -> f32 {
+        let (dx, dy) = (self.x_px - disc.x_px, self.y_px - disc.y_px);
+        dx * dx + dy * dy
+    }
 }
 
 /// A square of cells of any size, so that they are as fine as the map's memory allows.
