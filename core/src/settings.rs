@@ -76,12 +76,11 @@ pub struct Memory<'m> {
     pub weights: &'m mut [u8],
     /// What measuring works in.
     pub work: &'m mut Work,
-    /// Room for more events than fit there, by which a window is searched once more; the device lends none.
+    /// Room for more events than fit there; the device lends none.
     pub more: Option<More<'m>>,
 }
 
-/// Room for more events, among which what the first search missed is looked for: what a share s of N events keeps step with stands out
-/// from chance by s^2 N.
+/// Room for more events to search among: what a share s of N events keeps step with stands out from chance by s^2 N.
 #[derive(Debug)]
 pub struct More<'m> {
     /// Times of those that are searched: more than [`crate::limits::VISITS`], and at most 65 535.

@@ -87,8 +87,6 @@ pub struct Tachometer<'m> {
     in_step_hz: Option<f32>,
     /// Whether a rotor that is followed was not locked in this window.
     lost: bool,
-    /// How often all of the picture was searched in this window: the second time among as many events as more room was lent for.
-    searches: u8,
     tracker: Tracker,
     /// Readings until the whole image is searched again, or [`rhythm::NEVER`].
     until_search: u8,
@@ -142,7 +140,6 @@ impl<'m> Tachometer<'m> {
             outcomes: Vec::new(),
             in_step_hz: None,
             lost: false,
-            searches: 0,
             tracker: Tracker::default(),
             until_search: 0,
             round: Round::default(),

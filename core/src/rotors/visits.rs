@@ -12,7 +12,7 @@ use super::disc::Disc;
 use super::heat::CellGrid;
 use super::lines::LAGS;
 use crate::event::Geometry;
-use crate::limits::VISIT_CELLS;
+use crate::limits::{VISIT_CELLS, VISITS};
 use crate::math::{Turn, sqrt};
 use crate::store::{Even, StoredEvent, Window};
 
@@ -49,6 +49,8 @@ pub struct Visits {
     ends: [u16; VISIT_CELLS],
     /// Next cell to make pairs of, or to map.
     cell: usize,
+    /// Only one of so many events of a cell is mapped.
+    stride: usize,
     /// What unrelated events would add up to.
     chance: Chance,
 }
@@ -69,6 +71,7 @@ impl Default for Visits {
             window_us: 1,
             ends: [0; VISIT_CELLS],
             cell: 0,
+            stride: 1,
             chance: Chance::default(),
         }
     }
@@ -307,6 +310,7 @@ impl Visits {
     /// Starts to map which cells keep step with a frequency.
     pub const fn start_map(&mut self) {
         self.cell = 0;
+        self.stride = 1;
     }
 
     /// Writes the power over chance of some cells at a frequency as weights, row by row; `true` once all are written.
@@ -318,7 +322,7 @@ impl Visits {
         while self.cell < cells && mapped < MAPPED_A_STEP {
             let mut sums = [Sum::default(); 2];
             let times = self.of(self.cell, times);
-            for time in times {
+            for time in times.iter().step_by(self.stride) {
                 let (sin, cos) = Turn(per_tick.wrapping_mul(u32::from(time >> 1))).sin_cos();
                 let sum = &mut sums[usize::from(time & 1)];
                 sum.re += cos;
@@ -329,7 +333,17 @@ impl Visits {
             weights[self.cell] = Excess::of(sums).pack();
             self.cell += 1;
         }
-        self.cell >= cells
+        if self.cell < cells {
+            return false;
+        }
+        // More than a byte can tell: the strongest cells would count for less than they are beside the weaker ones.
+        let thinned = usize::from(self.ends[VISIT_CELLS - 1]) / (2 * self.stride);
+        if thinned >= VISITS && weights.iter().take(cells).any(|weight| Excess::is_full(*weight)) {
+            self.stride *= 2;
+            self.cell = 0;
+            return false;
+        }
+        true
     }
 
     /// Turns these powers into weights of the cells that keep step, zero for the others. A cell is judged together with its
@@ -402,10 +416,17 @@ impl Excess {
         })
     }
 
+    const MOST_HALVES: u8 = 63;
+
     /// Halves in the upper six bits, from the least possible -2 up to 29.5.
     fn pack(self) -> u8 {
-        let halves = ((self.power + 2.0) * 2.0).clamp(0.0, 63.0) as u8;
+        let halves = ((self.power + 2.0) * 2.0).clamp(0.0, f32::from(Self::MOST_HALVES)) as u8;
         (halves << 2) | self.banks
+    }
+
+    /// Whether the power may be larger than it says.
+    const fn is_full(packed: u8) -> bool {
+        packed >> 2 == Self::MOST_HALVES
     }
 
     /// Four times the power, above eight bits that hold the banks, so that one sum adds up both; 0 without banks.

@@ -21,7 +21,6 @@ impl Tachometer<'_> {
         self.outcomes.clear();
         self.in_step_hz = None;
         self.lost = false;
-        self.searches = 0;
         let known = self.tracker.known().iter().filter(|known| known.can_be_followed());
         for known in known {
             let followed = Some((known.parts, known.alike));
@@ -53,7 +52,6 @@ impl Tachometer<'_> {
     /// Searches the image outside of what was measured in this window.
     fn search_anew(&mut self) {
         self.until_search = self.rhythm.search_every;
-        self.searches += 1;
         self.candidates.clear();
         self.search(Extraction::default());
     }
@@ -90,7 +88,6 @@ impl Tachometer<'_> {
     /// One step of the running job; `true` once the window has been measured.
     fn step(&mut self) -> bool {
         let window = self.store.window(self.window_segments, self.window_end_us);
-        let again = self.searches > 1;
         match &mut self.job {
             Job::Idle => true,
             Job::Search(extraction) => {
@@ -98,12 +95,12 @@ impl Tachometer<'_> {
                 let Some(weights) = self.weights.get_mut(..grid.len()) else { return true };
                 let Scratch::Search { scratch, times } = self.scratch else { return true };
                 let (times, polar) = match &mut self.more {
-                    Some(more) if again => (&mut *more.times, &mut *more.track),
-                    _ => (times.as_mut_slice(), self.polar.as_mut_view()),
+                    Some(more) => (&mut *more.times, &mut *more.track),
+                    None => (times.as_mut_slice(), self.polar.as_mut_view()),
                 };
                 let mut view = View { window, grid, weights, times };
                 if extraction.step(&mut view, polar, self.spectrum, scratch) {
-                    self.in_step_hz = extraction.in_step_hz().or(self.in_step_hz);
+                    self.in_step_hz = extraction.in_step_hz();
                     self.round = extraction.round();
                     for candidate in extraction.candidates() {
                         suspect(&mut self.candidates, *candidate);
@@ -123,8 +120,8 @@ impl Tachometer<'_> {
                     clock_sigma_ppm: self.settings.clock_sigma_ppm,
                 };
                 let polar = match &mut self.more {
-                    Some(more) if again => &mut *more.track,
-                    _ => self.polar.as_mut_view(),
+                    Some(more) => &mut *more.track,
+                    None => self.polar.as_mut_view(),
                 };
                 if !measurement.step(&window, &stated, polar, bench) {
                     return false;
@@ -180,9 +177,6 @@ impl Tachometer<'_> {
             if self.lost && !self.catching_up {
                 // What was lost is looked for in this very window, outside of what was not.
                 self.lost = false;
-                self.search_anew();
-            } else if self.searches == 1 && self.more.is_some() && !self.catching_up {
-                // What stood out too little may do so among more events. Not at once: what moves in the background does, too.
                 self.search_anew();
             } else {
                 self.job = Job::Idle;

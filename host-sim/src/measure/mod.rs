@@ -20,7 +20,7 @@ pub use summary::{Summary, summarise};
 pub use table::{evidence, table};
 pub use ties::Ties;
 
-/// A PC's second search looks at so many times as many events as the device's search.
+/// A PC searches among so many times as many events as the device.
 const MORE: usize = 8;
 
 /// How much memory the tachometer is lent: the only difference between device and PC.
