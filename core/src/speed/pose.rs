@@ -28,7 +28,7 @@ use blocks::{
     BLOCK_SHARE, Block, LEAST_SHARE, MOST_FINE_WALK, MOST_WALK, Seen, WALK_PX, WALK_SINGLE_PX,
     WALK_US, Walk, correct,
 };
-use schedule::{Phase, Schedule};
+use schedule::{Phase, SETTLED_PX, Schedule};
 pub use slope::Slope;
 use template::{BANKS, Counts, RINGS, Template};
 pub use tilt::Tilt;
@@ -48,6 +48,9 @@ const MOST_HARMONIC: u32 = 96;
 const SHARP_COHERENCE: f32 = 0.5;
 /// The same where blocks hold few events: a path that went astray at a sparse end does not find back to a harmonic so fine.
 const SPARSE_COHERENCE: f32 = 0.7;
+
+/// Phase at the rim, in radians of a doubled harmonic, by which the path may still move when it is doubled.
+const MOST_OFF_RAD: f32 = 1.0;
 
 /// Root mean square speed of the axis in px/s from which on the camera moves: a hand makes some 80, and what few events scatter by
 /// looks like 20.
@@ -345,7 +348,10 @@ impl Pose {
             |least: f32| fine && at_high > least * self.first_coherence && 2.0 * at_high > at_low;
         // The path comes first: all events correct it by this template before one of twice the harmonic is believed.
         let waits = self.schedule.phase() >= Phase::All && self.phases.is_none();
-        let sharper = (at_high > at_low || shows(least)) && self.may_double() && !waits;
+        // Nor while the path still moves by more than it reaches.
+        let off_rad = moved_px * (2 * self.harmonic) as f32 / self.disc.radius_px;
+        let strays = self.phases.is_some() && moved_px >= SETTLED_PX && off_rad > MOST_OFF_RAD;
+        let sharper = (at_high > at_low || shows(least)) && self.may_double() && !waits && !strays;
         // Few events show it as well as many, but a path does not follow them.
         self.overtone = if shows(SHARP_COHERENCE) && !sharper { at_high } else { 0.0 };
         self.harmonic *= if sharper { 2 } else { 1 };

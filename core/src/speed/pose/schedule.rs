@@ -1,7 +1,7 @@
 //! Which rounds the pose is found in, and what each looks at.
 
 /// Corrections that move the rim by less than this, in pixels, are the last of their phase.
-const SETTLED_PX: f32 = 0.3;
+pub const SETTLED_PX: f32 = 0.3;
 
 /// Phases, each with more of the window's detail than the one before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
