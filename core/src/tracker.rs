@@ -28,10 +28,16 @@ pub struct Known {
 }
 
 impl Known {
+    /// Whether the last reading saw it.
+    #[must_use]
+    pub const fn is_seen(&self) -> bool {
+        self.missed == 0
+    }
+
     /// Whether the last reading locked it, so that it can be followed: what was only suspected is not.
     #[must_use]
     pub fn can_be_followed(&self) -> bool {
-        self.missed == 0 && self.status == Status::Locked
+        self.is_seen() && self.status == Status::Locked
     }
 
     /// What is measured afresh where the last reading saw a rotor and this window has none in its place, even if a search misses
@@ -39,7 +45,7 @@ impl Known {
     #[must_use]
     pub fn afresh(&self) -> Option<Found> {
         let windings = self.parts.map_or(self.found.windings, u32::from);
-        (self.missed == 0).then_some(Found { windings, ..self.found })
+        self.is_seen().then_some(Found { windings, ..self.found })
     }
 
     /// What is measured again in the very next window, search or not: a speed that was told must not come and go.

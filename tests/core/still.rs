@@ -148,7 +148,37 @@ fn a_slow_rotor_after_a_still_scene_keeps_its_long_window() {
     }
 }
 
-/// On the device, which searches for it in parts, while it follows another.
+/// A PC searches the whole image every so often, the device a part of it in every so many readings: either way it follows a rotor
+/// that is locked instead of measuring it afresh, which takes a PC twenty times as long.
+#[test]
+fn a_locked_rotor_is_measured_afresh_only_once() {
+    let scene = Scene {
+        rotors: vec![Rotor { rpm: 1500.0, radius_px: 40.0, ..Rotor::default() }],
+        duration_ms: 1_600.0,
+        ..Scene::default()
+    };
+    let events = generate(&scene).expect("a scene in range").events;
+    let settings = Settings::new(Geometry::new(346, 260).expect("a sensor in range"));
+    for capacity in Capacity::ALL {
+        let (mut searches_later, mut afresh, mut readings, mut before) = (false, 0, 0, "idle");
+        with_tachometer(settings, capacity, |tachometer| {
+            for piece in events.chunk_by(|a, b| a.t_us / 500 == b.t_us / 500) {
+                tachometer.push(piece);
+                while tachometer.is_measuring() {
+                    let stage = tachometer.stage();
+                    searches_later |= stage == "visits" && readings > 0;
+                    afresh += u32::from(stage == "initial" && stage != before);
+                    before = stage;
+                    readings += u32::from(matches!(tachometer.poll(1), Poll::Ready(_)));
+                }
+            }
+        });
+        assert_eq!(afresh, 1, "{capacity:?}: {readings} readings");
+        assert!(searches_later && readings > 12, "{capacity:?}: {readings}");
+    }
+}
+
+/// While another is followed.
 #[test]
 fn what_turns_later_beside_a_rotor_is_found_while_that_one_is_read() {
     // 40 turns, so that the first goes on as if nothing had happened.
@@ -162,26 +192,33 @@ fn what_turns_later_beside_a_rotor_is_found_while_that_one_is_read() {
         let mut events = Vec::new();
         then(&mut events, &alone, ALONE_MS);
         let on_us = then(&mut events, &both, BOTH_MS);
-        let readings = read(&events, Capacity::Device, 500, u32::MAX);
-        let speeds =
-            |reading: &Reading| reading.rotors.iter().filter(|rotor| rotor.speed.is_some()).count();
-        let found = readings.iter().position(|reading| speeds(reading) == 2);
-        let found = found.expect("a reading of both");
-        let after_us = end_us(&readings[found]).saturating_sub(on_us);
-        let behind = &readings[found..];
-        let of_both = behind.iter().filter(|reading| speeds(reading) == 2).count();
-        show(&format!(
-            "radius {radius_px} px: found after {:.1} s; both in {of_both} of {} readings from then on",
-            after_us as f64 * 1e-6,
-            behind.len()
-        ));
-        assert!(after_us < 3_500_000, "{after_us}");
-        assert!(10 * of_both >= 9 * behind.len(), "{of_both} of {}", behind.len());
-        for reading in behind {
-            for rotor in &reading.rotors {
-                let told = rotor.speed.map_or(0.0, |speed| speed.omega_rad_s * 9.549_297);
-                let truth = if rotor.x_px < 175.0 { 1500.0 } else { rpm as f32 };
-                assert!(rotor.speed.is_none() || (told / truth - 1.0).abs() < 5e-3, "{reading:#?}");
+        for capacity in Capacity::ALL {
+            let readings = read(&events, capacity, 500, u32::MAX);
+            let speeds = |reading: &Reading| {
+                reading.rotors.iter().filter(|rotor| rotor.speed.is_some()).count()
+            };
+            let found = readings.iter().position(|reading| speeds(reading) == 2);
+            let found = found.expect("a reading of both");
+            let after_us = end_us(&readings[found]).saturating_sub(on_us);
+            let behind = &readings[found..];
+            let of_both = behind.iter().filter(|reading| speeds(reading) == 2).count();
+            show(&format!(
+                "radius {radius_px} px, {} memory: found after {:.1} s; both in {of_both} of {} readings from then on",
+                capacity.as_str(),
+                after_us as f64 * 1e-6,
+                behind.len()
+            ));
+            assert!(after_us < 3_500_000, "{after_us}");
+            assert!(10 * of_both >= 9 * behind.len(), "{of_both} of {}", behind.len());
+            for reading in behind {
+                for rotor in &reading.rotors {
+                    let told = rotor.speed.map_or(0.0, |speed| speed.omega_rad_s * 9.549_297);
+                    let truth = if rotor.x_px < 175.0 { 1500.0 } else { rpm as f32 };
+                    assert!(
+                        rotor.speed.is_none() || (told / truth - 1.0).abs() < 5e-3,
+                        "{reading:#?}"
+                    );
+                }
             }
         }
     }

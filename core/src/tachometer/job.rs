@@ -27,8 +27,16 @@ impl Tachometer<'_> {
             self.candidates.push(Suspect { found: known.found, followed }).ok();
         }
         let only_follows = self.catching_up && !self.candidates.is_empty();
-        if self.until_search == 0 && !only_follows || self.candidates.is_empty() {
+        let searches = self.until_search == 0 && !only_follows;
+        let seen = self.tracker.known().iter().filter(|known| known.is_seen()).count();
+        if self.candidates.is_empty() || searches && self.candidates.len() < seen {
             self.search_anew();
+            return;
+        }
+        if searches {
+            // What is locked is followed: measuring it afresh takes a PC twenty times as long.
+            self.until_search = self.rhythm.search_every;
+            self.search(Extraction::default());
             return;
         }
         for found in self.tracker.known().iter().filter_map(Known::told) {
