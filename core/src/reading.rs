@@ -260,6 +260,8 @@ pub struct Evidence {
     pub phase_rad_s: Option<f32>,
     /// Standard error of the polar phase's trend in rad/s.
     pub phase_sigma_rad_s: Option<f32>,
+    /// Standard deviation of the speed within the window by that trend, in rad/s: that of one swing a window.
+    pub swing_rad_s: Option<f32>,
     /// Fractional-baseline test: deviation as a share of the angle of symmetry.
     pub fractional_deviation: Option<f32>,
     /// Symmetry periods in the window.

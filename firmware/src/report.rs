@@ -66,7 +66,7 @@ fn write_evidence(f: &mut fmt::Formatter<'_>, evidence: &Evidence) -> fmt::Resul
         scan_rad_s, scan_score, scan_standing, coherence, symmetry_score,
         initial_rad_s, refined_rad_s, refined_sigma_rad_s, further_rad_s,
         lock_rad_s, lock_sigma_rad_s, sharpness_px, phase_rad_s, phase_sigma_rad_s,
-        fractional_deviation, periods
+        swing_rad_s, fractional_deviation, periods
     )
 }
 

@@ -79,6 +79,8 @@ pub struct Pairs {
     folds: u32,
     /// Whether the next pair is being registered.
     registering: bool,
+    /// Mean rate of the path's turn over the window in rad/s; `None`: yaws are taken as they are.
+    even_rad_s: Option<f32>,
     yaws: Vec<f32, MAX_PAIRS>,
     /// How many of the pairs share no slice with another.
     independent: f32,
@@ -103,6 +105,7 @@ impl Pairs {
             next: 0,
             folds,
             registering: false,
+            even_rad_s: None,
             yaws: Vec::new(),
             independent,
         }
@@ -126,7 +129,7 @@ impl Pairs {
         }
         let Progress::Done(found) = icp.step() else { return false };
         if let Some(found) = found {
-            self.yaws.push(found.yaw_rad - start_rad).ok();
+            self.yaws.push(found.yaw_rad - start_rad - self.bent_rad(window, path)).ok();
         }
         self.registering = false;
         self.next += 1;
@@ -145,15 +148,37 @@ impl Pairs {
         }
     }
 
-    /// Cuts the two slices of the next pair.
-    fn cut(&self, window: &Window<'_>, path: &Path, icp: &mut Icp) {
+    /// Takes from each yaw what the pair turned by beyond the mean over the window, where the speed changes: by the path, whose turn has
+    /// this mean rate.
+    pub const fn along(&mut self, even_rad_s: f32) {
+        self.even_rad_s = Some(even_rad_s);
+    }
+
+    /// Baseline and span of a slice, in microseconds, and when the next pair starts.
+    fn times_us(&self, window: &Window<'_>) -> (f32, f32, f32) {
         let period_us = self.pace.period_us();
         let baseline_us = self.periods * period_us;
         let span_us = (self.folds as f32 - 1.0 + SLICE_PERIODS) * period_us;
         let room_us = (window.duration_us as f32 - baseline_us - span_us).max(0.0);
+        (baseline_us, span_us, self.apart_us(room_us) * self.next as f32)
+    }
+
+    /// By how much the pair turns beyond the window's mean speed, along the path.
+    fn bent_rad(&self, window: &Window<'_>, path: &Path) -> f32 {
+        let Some(even_rad_s) = self.even_rad_s else { return 0.0 };
+        let (baseline_us, span_us, start_us) = self.times_us(window);
+        let first_us = start_us + 0.5 * (span_us - window.duration_us as f32);
+        let turned_rad = path.at(first_us + baseline_us).turn_rad - path.at(first_us).turn_rad;
+        turned_rad - even_rad_s * baseline_us * 1e-6
+    }
+
+    /// Cuts the two slices of the next pair.
+    fn cut(&self, window: &Window<'_>, path: &Path, icp: &mut Icp) {
+        let period_us = self.pace.period_us();
+        let (baseline_us, _, start_us) = self.times_us(window);
         let disc = Moving::new(self.pace.disc, path, window);
         let mut cut = Cut {
-            start_us: self.apart_us(room_us) * self.next as f32,
+            start_us,
             length_us: SLICE_PERIODS * period_us,
             period_us,
             folds: self.folds,

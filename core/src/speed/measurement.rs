@@ -247,7 +247,7 @@ impl Measurement {
     }
 
     /// Whether the axis moves in the picture, as far as was seen.
-    fn moves(&self) -> bool {
+    pub(super) fn moves(&self) -> bool {
         self.drift_px_s > MOVING_PX_S
     }
 
@@ -277,6 +277,7 @@ impl Measurement {
         if let Some(found) = self.pose.slope() {
             self.evidence.phase_rad_s = Some(found.speed.omega_rad_s);
             self.evidence.phase_sigma_rad_s = Some(found.speed.sigma_rad_s);
+            self.evidence.swing_rad_s = Some(found.swing_rad_s);
             // A hand that holds still for a window trembles in the next.
             let before_px_s = if self.follows { self.drift_px_s } else { found.drift_px_s };
             self.drift_px_s = root_mean_square(before_px_s, found.drift_px_s);

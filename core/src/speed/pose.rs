@@ -26,7 +26,7 @@ use crate::rotors::Disc;
 use crate::store::{Even, Window};
 use blocks::{
     BLOCK_SHARE, Block, LEAST_SHARE, MOST_FINE_WALK, MOST_WALK, Seen, WALK_PX, WALK_SINGLE_PX,
-    WALK_US, Walk, correct,
+    WALK_TWO_PX, WALK_US, Walk, correct,
 };
 use schedule::{Phase, SETTLED_PX, Schedule};
 pub use slope::Slope;
@@ -48,6 +48,8 @@ const MOST_HARMONIC: u32 = 96;
 const SHARP_COHERENCE: f32 = 0.5;
 /// The same where blocks hold few events: a path that went astray at a sparse end does not find back to a harmonic so fine.
 const SPARSE_COHERENCE: f32 = 0.7;
+/// Share of the events in step with each other that must be in step with the round before: else path and template chase each other.
+const TOGETHER: f32 = 0.75;
 
 /// Phase at the rim, in radians of a doubled harmonic, by which the path may still move when it is doubled.
 const MOST_OFF_RAD: f32 = 1.0;
@@ -96,8 +98,8 @@ pub struct Pose {
     harmonic: u32,
     first_harmonic: u32,
     most_harmonic: u32,
-    /// Harmonic whose template was last learnt anew.
-    relearnt: u32,
+    /// Whether path and template came apart before.
+    came_apart: bool,
     /// Parts that have a template of their own.
     sectors: u32,
     walk_px: f32,
@@ -143,9 +145,13 @@ impl Pose {
             harmonic,
             first_harmonic: harmonic,
             most_harmonic: MOST_HARMONIC,
-            relearnt: 0,
+            came_apart: false,
             sectors: 1,
-            walk_px: if parts > 1 { WALK_PX } else { WALK_SINGLE_PX },
+            walk_px: match parts {
+                0 | 1 => WALK_SINGLE_PX,
+                2 => WALK_TWO_PX,
+                _ => WALK_PX,
+            },
             tilt: None,
             path: Path::STILL,
             in_period: 0,
@@ -297,16 +303,12 @@ impl Pose {
         let fine = self.schedule.is_fine();
         let at_low = sums.low.coherence(&sums.counts);
         let blurred = at_low < SHARP_COHERENCE * self.first_coherence;
-        // Too few events for so high a harmonic: path and template chase each other.
-        let apart = self.schedule.phase() >= Phase::All
-            && self.phases.is_some()
-            && sums.in_step() < SHARP_COHERENCE * at_low;
+        // Path and template chase each other: too few events for so high a harmonic, or they met at a wrong one.
+        let apart = fine && self.phases.is_some() && sums.in_step() < TOGETHER * at_low;
         if fine && (blurred || apart) && self.harmonic > self.first_harmonic {
-            if blurred || self.relearnt == self.harmonic {
-                self.step_back();
-            } else {
-                self.learn_anew();
-            }
+            // Once it is raised again, from where the template reaches farther.
+            self.halve(blurred || self.came_apart);
+            self.came_apart = true;
             return false;
         }
         self.sift(sums);
@@ -314,7 +316,7 @@ impl Pose {
             self.slope = self.trend(sums);
             if self.slope.is_none() && self.harmonic > self.first_harmonic {
                 // Too few blocks are in step, or the path slipped.
-                self.step_back();
+                self.halve(true);
                 return false;
             }
             let (x_px, y_px) = self.path.centre();
@@ -382,16 +384,12 @@ impl Pose {
         2 * self.harmonic <= self.most_harmonic
     }
 
-    /// The harmonic was raised too far: half of it, and no higher again.
-    const fn step_back(&mut self) {
+    /// Learns the template of half the harmonic about the path as it is; for good, it goes no higher again.
+    const fn halve(&mut self, for_good: bool) {
         self.harmonic /= 2;
-        self.learn_anew();
-    }
-
-    /// Learns the template of this harmonic anew about the path as it is, and goes no higher again.
-    const fn learn_anew(&mut self) {
-        self.relearnt = self.harmonic;
-        self.most_harmonic = self.harmonic;
+        if for_good {
+            self.most_harmonic = self.harmonic;
+        }
         self.coherence = self.first_coherence;
         self.phases = None;
         self.schedule.again();

@@ -45,6 +45,8 @@ pub struct Trend {
     pub bend: f32,
     /// Its standard error as a parabola beside all else that bends the trend.
     pub bend_error: f32,
+    /// Mean square by which the trend is bent away from a straight line.
+    pub bent: f32,
     /// Points beyond those that the fit takes up.
     pub degrees_of_freedom: usize,
 }
@@ -146,27 +148,31 @@ impl Trend {
         }
         // The mean of all, each as likely as the points make it.
         let mut whole = 0.0;
-        let mut mean = [0.0_f32; 5];
+        let mut mean = [0.0_f32; 6];
         for (cost, trend) in &tried {
             // exp(-x / 2), but for what is hardly likely.
             let likely = (0..4).fold(1.0 / (1.0 + (cost - least) / 32.0), |x, _| x * x);
             whole += likely;
-            let Self { slope, slope_error, bend_error, .. } = *trend;
+            let Self { slope, slope_error, bend_error, bent, .. } = *trend;
             let moments = [
                 slope,
                 slope * slope,
                 slope_error * slope_error,
                 bend_error * bend_error,
+                bent,
                 trend.degrees_of_freedom as f32,
             ];
             mean.iter_mut().zip(moments).for_each(|(mean, moment)| *mean += likely * moment);
         }
-        let [slope, square, variance, bend_variance, degrees_of_freedom] = mean.map(|m| m / whole);
+        let [slope, square, variance, bend_variance, bent, degrees_of_freedom] =
+            mean.map(|m| m / whole);
+        let weight: f32 = points.points.iter().map(|p| p.weight).sum();
         Some(Self {
             slope,
             slope_error: sqrt(variance + (square - slope * slope).max(0.0)),
             bend: bend * coefficients[1],
             bend_error: bend * sqrt(bend_variance),
+            bent: bent / weight,
             degrees_of_freedom: degrees_of_freedom as usize,
         })
     }
@@ -177,6 +183,7 @@ impl Trend {
 /// `free` points. The bend's error is that of the second coefficient.
 fn shrunk(terms: (&[f32], &[f32]), squares: f32, free: usize, size: f32) -> (f32, Trend) {
     let (mut sum, mut cost, mut slope, mut share, mut taken) = (squares, 0.0, 0.0, 0.0, 0.0);
+    let mut bent = 0.0;
     for (index, (s, c)) in terms.0.iter().zip(terms.1).enumerate() {
         // A parabola always: its bend is asked for.
         let kept = if index + 1 < FIRST_BEND {
@@ -191,6 +198,7 @@ fn shrunk(terms: (&[f32], &[f32]), squares: f32, free: usize, size: f32) -> (f32
         slope += kept * s * c;
         share += kept * s * s;
         taken += kept;
+        bent += if index > 0 { kept * c * c } else { 0.0 };
     }
     let n = (free + 1 - FIRST_BEND) as f32;
     let variance = sum / n;
@@ -199,6 +207,7 @@ fn shrunk(terms: (&[f32], &[f32]), squares: f32, free: usize, size: f32) -> (f32
         slope_error: sqrt(variance * share),
         bend: 0.0,
         bend_error: sqrt(variance * (1.0 + size)),
+        bent,
         degrees_of_freedom: (free as f32 - taken) as usize,
     };
     (cost + n * ln(sum.max(f32::MIN_POSITIVE)), found)
@@ -244,6 +253,17 @@ mod tests {
         let found = Trend::fit(&points(1e-3, wave), 1).unwrap_or_default();
         let mean = 0.5 * (wave(1.0) - wave(-1.0));
         assert!((found.slope - mean).abs() < 3.0 * found.slope_error, "{mean} {found:?}");
+    }
+
+    #[test]
+    fn a_bent_line_is_bent_by_so_much_and_a_straight_one_is_not() {
+        let wave = |u: f32| 0.3 * u + 0.05 * libm::sinf(core::f32::consts::PI * u);
+        let found = Trend::fit(&points(1e-3, wave), 1).unwrap_or_default();
+        // What is left of sin(pi u) beside its own slope of 3 / pi.
+        let bent = 0.05 * 0.05 * 0.196;
+        assert!((found.bent / bent - 1.0).abs() < 0.2, "{found:?}");
+        let straight = Trend::fit(&points(1e-3, |u| 0.3 * u), 1).unwrap_or_default();
+        assert!(straight.bent < 1e-7, "{straight:?}");
     }
 
     #[test]

@@ -11,17 +11,22 @@ const OVERLAP: f64 = 3.0;
 /// Sigmas by which a slope stands out of the errors of the readings.
 const SLOPE_SIGMAS: f64 = 4.0;
 
+/// What a hand rolls a camera to and fro by, in rad/s: it is in the swing that a window shows, and not in a speed relative to the room.
+const HAND_ROLL_RAD_S: f64 = 0.2;
+
 /// The mean speed within one reading's window.
 pub struct Piece {
     window_us: Range<u64>,
     speed: Speed,
+    swing_rad_s: f64,
 }
 
 impl Piece {
-    /// A rotor's speed in a reading.
-    pub fn new(reading: &Reading, speed: Speed) -> Self {
+    /// A rotor's speed in a reading, and how it swings within the window.
+    pub fn new(reading: &Reading, speed: Speed, swing_rad_s: Option<f32>) -> Self {
         let start_us = reading.t_us.saturating_sub(u64::from(reading.window_us) / 2);
-        Self { window_us: start_us..start_us + u64::from(reading.window_us), speed }
+        let window_us = start_us..start_us + u64::from(reading.window_us);
+        Self { window_us, speed, swing_rad_s: f64::from(swing_rad_s.unwrap_or(0.0)) }
     }
 
     fn length_us(&self) -> u64 {
@@ -38,6 +43,15 @@ impl Piece {
 
     fn variance(&self) -> f64 {
         f64::from(self.speed.omega_sigma_rad_s).powi(2)
+    }
+
+    /// Variance of the speed within the window.
+    fn swing_variance(&self) -> f64 {
+        let by_hand = match self.speed.frame {
+            Frame::Camera => 0.0,
+            Frame::Room => HAND_ROLL_RAD_S,
+        };
+        (self.swing_rad_s.powi(2) - by_hand.powi(2)).max(0.0)
     }
 
     /// Finite also for a sigma of zero.
@@ -94,12 +108,13 @@ fn weighted_mean(pieces: &[Piece], of: impl Fn(&Piece) -> f64) -> f64 {
 ///
 /// A reading is the turn between its window's ends, so windows laid end to end are exact however the speed varies.
 /// What they leave open is filled in from the line through all and the reading next to it, each as far as it is
-/// known, and is as uncertain as readings scatter about that line.
+/// known, and is as uncertain as readings scatter about that line, and as the speed swings within a window.
 pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) -> Option<Speed> {
     pieces.first()?;
     let line = Line::through(pieces, span_us.start);
     let off = |piece: &Piece| piece.omega_rad_s() - line.at(piece.middle_us());
     let scatter = weighted_mean(pieces, |p| off(p).powi(2));
+    let swing = weighted_mean(pieces, Piece::swing_variance);
 
     let clock = (f64::from(clock_sigma_ppm) * 1e-6 * line.mean_rad_s).powi(2);
     let (mut whole_s, mut turn_rad, mut turn_variance, mut by_gyro) = (0.0, 0.0, 0.0, 0.0);
@@ -125,7 +140,10 @@ pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) 
             let moved = line.slope_rad_s2.map_or(0.0, |_| away_s * away_s * line.slope_variance);
             // How much of what the next reading is off by the line is the speed's, and not its own error.
             let own = scatter / (scatter + near.variance()).max(f64::from(f32::MIN_POSITIVE));
-            let variance = scatter + own * near.variance() + moved;
+            // What lasts for longer than a window averages out.
+            let windows = (open_us.end - open_us.start) as f64 / near.length_us().max(1) as f64;
+            let varies = scatter + swing / windows.max(1.0);
+            let variance = varies + own * near.variance() + moved;
             add(length_s, line.at(middle_us) + own * off(near), variance, near.speed.frame);
         }
         if let Some(tile) = tile {
@@ -213,6 +231,11 @@ mod tests {
 
     /// The mean of readings every 50 ms over 150 ms of a turn that is known at every instant, and its error.
     fn mean(turn_rad: impl Fn(f64) -> f64, until_ms: u64) -> (f64, f64) {
+        swinging_mean(turn_rad, until_ms, 0.0)
+    }
+
+    /// The same where readings tell how the speed swings within their windows.
+    fn swinging_mean(turn_rad: impl Fn(f64) -> f64, until_ms: u64, swing_rad_s: f64) -> (f64, f64) {
         let pieces: Vec<Piece> = (0..)
             .map(|i| 50 * i..50 * i + 150)
             .take_while(|window_ms| window_ms.end <= until_ms)
@@ -225,7 +248,11 @@ mod tests {
                     alpha_rad_s2: None,
                     frame: Frame::Camera,
                 };
-                Piece { window_us: window_ms.start * 1000..window_ms.end * 1000, speed }
+                Piece {
+                    window_us: window_ms.start * 1000..window_ms.end * 1000,
+                    speed,
+                    swing_rad_s,
+                }
             })
             .collect();
         let speed = mean_speed(&pieces, &(0..until_ms * 1000), 0.0).expect("readings");
@@ -259,7 +286,7 @@ mod tests {
                         alpha_rad_s2: None,
                         frame,
                     };
-                    Piece { window_us: i * 150_000..(i + 1) * 150_000, speed }
+                    Piece { window_us: i * 150_000..(i + 1) * 150_000, speed, swing_rad_s: 0.0 }
                 })
                 .collect();
             let mean = mean_speed(&pieces, &(0..450_000), 0.0).expect("readings");
@@ -281,7 +308,7 @@ mod tests {
             alpha_rad_s2: Some(10.0),
             frame: Frame::Camera,
         };
-        let pieces = [Piece { window_us: 0..300_000, speed }];
+        let pieces = [Piece { window_us: 0..300_000, speed, swing_rad_s: 0.0 }];
         let mean = mean_speed(&pieces, &(0..900_000), 0.0).expect("a reading");
         // 200 rad/s at 0.15 s, and so 203 at the middle.
         assert!((mean.omega_rad_s - 203.0).abs() < 1e-3, "{}", mean.omega_rad_s);
@@ -297,11 +324,23 @@ mod tests {
     }
 
     #[test]
+    fn a_swing_that_no_mean_shows_is_in_the_error_of_what_is_filled_in() {
+        // Once a window: all readings are alike.
+        let w = std::f64::consts::TAU / 0.15;
+        let turn_rad = |t: f64| 230.0 * t + 2.0 / w * (w * t).sin();
+        let (mean_rad_s, blind_rad_s) = mean(turn_rad, 640);
+        let off_rad_s = (mean_rad_s - turn_rad(0.64) / 0.64).abs();
+        let (_, sigma_rad_s) = swinging_mean(turn_rad, 640, 2.0_f64.sqrt());
+        assert!(off_rad_s > 4.0 * blind_rad_s, "{off_rad_s} {blind_rad_s}");
+        assert!(off_rad_s < 2.0 * sigma_rad_s, "{off_rad_s} {sigma_rad_s}");
+    }
+
+    #[test]
     fn a_window_that_knows_little_bends_nothing() {
         let piece = |start_us: u64, omega_rad_s, omega_sigma_rad_s| {
             let speed =
                 Speed { omega_rad_s, omega_sigma_rad_s, alpha_rad_s2: None, frame: Frame::Camera };
-            Piece { window_us: start_us..start_us + 150_000, speed }
+            Piece { window_us: start_us..start_us + 150_000, speed, swing_rad_s: 0.0 }
         };
         let pieces =
             [piece(0, 203.0, 1.0), piece(50_000, 200.0, 0.01), piece(100_000, 200.01, 0.01)];

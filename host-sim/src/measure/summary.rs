@@ -82,7 +82,9 @@ fn over_recording(
         let mut rotor = (*last).clone();
         let pieces: Vec<Piece> = locked
             .iter()
-            .filter_map(|(reading, rotor)| Some(Piece::new(reading, rotor.speed?)))
+            .filter_map(|(reading, rotor)| {
+                Some(Piece::new(reading, rotor.speed?, rotor.evidence.swing_rad_s))
+            })
             .collect();
         rotor.speed = mean_speed(&pieces, span_us, clock_sigma_ppm);
         let middle_us = span_us.start.midpoint(span_us.end);

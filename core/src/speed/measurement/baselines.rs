@@ -2,6 +2,7 @@
 
 use super::super::baseline::{Effort, Estimate, Pace, Pairs};
 use super::coarse::COARSE_AGREEMENT;
+use super::verdict::LOCK_AGREEMENT;
 use super::{Measurement, Stage};
 use crate::limits::SLICE_POINTS;
 use crate::reading::Reason;
@@ -57,6 +58,20 @@ impl Measurement {
     pub(super) fn plan(&mut self, window: &Window<'_>, periods: f32, effort: Effort) {
         let plan = Pairs::plan(self.pace(), periods, effort, self.events, window.duration_us);
         self.pairs = Some(plan);
+    }
+
+    /// Plans pairs of the lock. Where the speed swings, their yaws are made those of the window's mean speed wherever in the window they
+    /// lie. By less than witnesses may differ it does not matter, and a path that went astray, as in a hand, would bear itself out.
+    // Not inlined: it is called in three places.
+    #[inline(never)]
+    fn plan_lock_pairs(&mut self, window: &Window<'_>, periods: f32, effort: Effort) {
+        self.plan(window, periods, effort);
+        let least_rad_s = LOCK_AGREEMENT * self.omega_rad_s.abs();
+        let slope =
+            self.pose.slope().filter(|slope| slope.swing_rad_s > least_rad_s && !self.moves());
+        if let (Some(pairs), Some(slope)) = (&mut self.pairs, slope) {
+            pairs.along(slope.beyond_rad_s);
+        }
     }
 
     /// As many pairs as the events are worth, so many of them for each.
@@ -143,7 +158,7 @@ impl Measurement {
         } else {
             self.worth(LOCK, PAIR_EVENTS)
         };
-        self.plan(window, m, effort);
+        self.plan_lock_pairs(window, m, effort);
     }
 
     /// Long-baseline lock.
@@ -163,7 +178,7 @@ impl Measurement {
         }
         let effort = if self.follows { Effort { pairs: 1, ..FOLLOWING } } else { FRACTIONAL };
         self.turn = 0;
-        self.plan(window, (longest - FRACTION).max(LEAST_FRACTIONAL), effort);
+        self.plan_lock_pairs(window, (longest - FRACTION).max(LEAST_FRACTIONAL), effort);
         self.stage = Stage::Fractional;
     }
 
@@ -180,7 +195,7 @@ impl Measurement {
                 let whole = crate::math::floor(SHORTER * periods / parts) * parts;
                 periods = (whole - FRACTION).max(LEAST_FRACTIONAL);
             }
-            self.plan(window, periods, FRACTIONAL_AGAIN);
+            self.plan_lock_pairs(window, periods, FRACTIONAL_AGAIN);
             return;
         }
         self.stage = Stage::Verdict;

@@ -5,7 +5,7 @@ use super::baselines::FRACTION;
 use super::doubt::SMALL_PX;
 use super::{ACCELERATION_SIGMAS, Measurement, Stated};
 use crate::math::{TAU, sqrt};
-use crate::reading::{Reason, Status};
+use crate::reading::{Evidence, Reason, Status};
 use crate::speed::queue::stretch;
 use crate::store::Window;
 use crate::tachometer::BASE_WINDOW_US;
@@ -34,12 +34,14 @@ const MOST_DEVIATION: f32 = 0.03;
 /// fast rotor's period makes its registrations scatter by as much as the next winding would.
 const MOST_CLEAR_DEVIATION: f32 = 0.35 * FRACTION;
 /// Witnesses of the lock may differ by this much, or by eight standard errors.
-const LOCK_AGREEMENT: f32 = 2e-3;
+pub(super) const LOCK_AGREEMENT: f32 = 2e-3;
 const LOCK_SIGMAS: f32 = 8.0;
 /// The refinement may differ from them by this much, or by five standard errors: the next harmonic of eight would by a ninth, and thin
 /// slices of a fast rotor that is looked at from aside fall short by a twentieth.
 const REFINED_AGREEMENT: f32 = 0.1;
 const REFINED_SIGMAS: f32 = 5.0;
+/// Own standard errors beyond which they contradict each other from a moving camera: one of the two went astray with the axis.
+const ASTRAY_SIGMAS: f32 = 4.0;
 /// A lock with a larger relative error is only coarse.
 const MOST_LOCK_SIGMA: f32 = 3e-3;
 /// Relative error to which a lock is believed whatever the phase's is.
@@ -150,8 +152,9 @@ impl Measurement {
             _ => {}
         }
         let own = self.estimate.sigma_rad_s;
+        let astray = if roll > 0.0 { self.astray_rad_s() } else { 0.0 };
         let late = held_up * self.estimate.omega_rad_s;
-        self.estimate.sigma_rad_s = sqrt(own * own + late * late + clock * clock);
+        self.estimate.sigma_rad_s = sqrt(own * own + astray * astray + late * late + clock * clock);
         self.roll_sigma_rad_s = roll;
     }
 
@@ -165,6 +168,15 @@ impl Measurement {
             let most = LOCK_SIGMAS * sqrt(a * a + b * b);
             apart < (LOCK_AGREEMENT * lock.omega_rad_s.abs()).max(most) && self.fits_between()
         })
+    }
+
+    /// Half of what the witnesses of the lock are apart where that is more than their own scatter explains: the truth may be with either.
+    fn astray_rad_s(&self) -> f32 {
+        let Evidence { lock_rad_s, lock_sigma_rad_s, phase_rad_s, phase_sigma_rad_s, .. } =
+            self.evidence;
+        let apart_rad_s = lock_rad_s.zip(phase_rad_s).map_or(0.0, |(a, b)| (a - b).abs());
+        let scatter = lock_sigma_rad_s.zip(phase_sigma_rad_s).map_or(0.0, |(a, b)| a * a + b * b);
+        if apart_rad_s > ASTRAY_SIGMAS * sqrt(scatter) { 0.5 * apart_rad_s } else { 0.0 }
     }
 
     /// Whether the refinement, which knows nothing of harmonics, saw another speed: about a wrong centre a neighbour of the right
@@ -276,8 +288,11 @@ impl Measurement {
         let stretched = stretch > MOST_ERROR;
         let own = self.estimate.sigma_rad_s;
         let sigma_rad_s = sqrt(own * own + roll_rad_s * roll_rad_s);
-        if stretched || sigma_rad_s > most * self.omega_rad_s.abs() {
-            self.status = Status::Refused(Reason::Ambiguous);
+        let rough = sigma_rad_s > most * self.omega_rad_s.abs();
+        if stretched || rough {
+            let slow = !stretched && self.wanted_us > window.duration_us as f32;
+            let reason = if slow { Reason::TooSlow } else { Reason::Ambiguous };
+            self.status = Status::Refused(reason);
         }
     }
 

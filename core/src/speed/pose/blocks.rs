@@ -20,6 +20,8 @@ pub const WALK_US: f32 = 5_000.0;
 pub const MOST_WALK: f32 = 6.0;
 pub const MOST_FINE_WALK: f32 = 1.5;
 pub const WALK_PX: f32 = 0.5;
+/// The same for a rotor with two blades, which hardly show a shift along them: path and template drift there together.
+pub const WALK_TWO_PX: f32 = 0.1;
 /// The same for a rotor with a single mark, whose shift and turn look alike.
 pub const WALK_SINGLE_PX: f32 = 0.05;
 /// Turn beyond an even one from knot to knot, in rad/s: what a hand rolls, and as a share of the speed, what a motor hunts.

@@ -79,6 +79,8 @@ impl Schedule {
         if matches!(self.phase, Phase::All | Phase::Last) {
             self.phase = Phase::All;
             self.round = 0;
+            // One learns, and what it learns is to correct the path, too.
+            self.most = Self::NEW.most;
         }
     }
 

@@ -23,6 +23,10 @@ const SLIP_CYCLES: f32 = 0.4;
 pub struct Slope {
     /// Mean speed over the window.
     pub speed: Estimate,
+    /// The same beyond the even turn that the path starts from.
+    pub beyond_rad_s: f32,
+    /// Standard deviation of the speed within the window, in rad/s: that of one swing a window.
+    pub swing_rad_s: f32,
     /// Acceleration in rad/s^2.
     pub alpha_rad_s2: f32,
     /// Its standard error in rad/s^2.
@@ -71,6 +75,8 @@ impl Pose {
                 omega_rad_s: self.omega_rad_s + trend.slope / half_s,
                 sigma_rad_s: factor * trend.slope_error / half_s,
             },
+            beyond_rad_s: trend.slope / half_s,
+            swing_rad_s: 0.5 * TAU / half_s * sqrt(trend.bent),
             alpha_rad_s2: trend.bend / (half_s * half_s),
             alpha_sigma_rad_s2: factor * trend.bend_error / (half_s * half_s),
             drift_px_s: self.drift_px_s(),
