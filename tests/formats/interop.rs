@@ -11,6 +11,7 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 use evtach_core::{Event, Geometry};
+use evtach_host::recording::ImuSample;
 use evtach_host::recording::write::{self, WriteFormat};
 use scratch::{Scratch, event, read};
 
@@ -44,13 +45,14 @@ fn find_python() -> Option<String> {
     }
 }
 
-fn peers(python: &str, arguments: &[&str]) {
+fn peers(python: &str, arguments: &[&str]) -> String {
     let output = Command::new(python)
         .arg(interop_folder().join("peers.py"))
         .args(arguments)
         .output()
         .expect("the virtual environment's Python runs");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
 /// Events that cross the wraps of EVT 3 (16.8 s), share microseconds, and pause.
@@ -80,6 +82,25 @@ fn write_ours(path: &Path, format: WriteFormat, events: &[Event]) {
     let mut writer = write::create(path, format, SIZE).expect("a file");
     writer.write(events).expect("events that fit");
     writer.finish().expect("room on the disk");
+}
+
+/// Writes AEDAT 4 with a thousand inertial samples a second for the first seconds, and gives these.
+fn write_ours_with_imu(path: &Path, events: &[Event]) -> Vec<ImuSample> {
+    let first_us = events.first().map_or(0, |event| event.t_us);
+    let samples: Vec<ImuSample> = (0..3000_u16)
+        .map(|index| ImuSample {
+            t_us: first_us + u64::from(index) * 1000,
+            gyro_rad_s: [0.01, -0.02, f32::from(index) * 1e-3],
+            accel_m_s2: [0.1, -9.8, f32::from(index) * 1e-3],
+        })
+        .collect();
+    let mut writer = write::create(path, WriteFormat::Aedat4, SIZE).expect("a file");
+    for (samples, events) in samples.chunks(1000).zip(events.chunks(events.len().div_ceil(3))) {
+        writer.write_imu(samples).expect("samples that fit");
+        writer.write(events).expect("events that fit");
+    }
+    writer.finish().expect("room on the disk");
+    samples
 }
 
 /// Recordings in a folder, those inside bag folders included.
@@ -164,6 +185,7 @@ fn what_is_written_here_is_read_by_peers() {
     ] {
         write_ours(&scratch.file(&format!("ours.{name}")), format, &events);
     }
+    write_ours_with_imu(&scratch.file("ours.imu.aedat4"), &events);
     peers(python, &["read", &scratch.path().display().to_string()]);
     let mut read_back = 0;
     for file in recordings(scratch.path()) {
@@ -175,5 +197,30 @@ fn what_is_written_here_is_read_by_peers() {
             read_back += 1;
         }
     }
-    assert_eq!(read_back, 10);
+    assert_eq!(read_back, 12);
+}
+
+#[test]
+fn inertial_samples_written_here_are_read_by_dv_with_their_units() {
+    let Some(python) = python() else { return };
+    let scratch = Scratch::new();
+    let file = scratch.file("ours.imu.aedat4");
+    let samples = write_ours_with_imu(&file, &events());
+    let printed = peers(python, &["imu", &file.display().to_string()]);
+    let rows: Vec<Vec<f64>> = printed
+        .lines()
+        .map(|line| line.split(' ').map(|word| word.parse().expect("a number")).collect())
+        .collect();
+    assert_eq!(rows.len(), samples.len());
+    for (row, sample) in rows.iter().zip(&samples) {
+        let (t_us, there) = row.split_first().expect("a time and six numbers");
+        assert_eq!(*t_us as u64, sample.t_us);
+        let here = [sample.gyro_rad_s, sample.accel_m_s2].concat();
+        assert_eq!(there.len(), here.len());
+        for (there, here) in there.iter().zip(here) {
+            // It takes gravity for 9.81007 m/s^2.
+            let off = (there - f64::from(here)).abs();
+            assert!(off <= 4e-4 * f64::from(here.abs()), "{row:?} for {sample:?}");
+        }
+    }
 }

@@ -4,8 +4,9 @@
 #[expect(dead_code, reason = "shared with other tests")]
 mod scratch;
 
-use evtach_core::{Event, Geometry};
+use evtach_core::{Event, Geometry, GyroSample};
 use evtach_host::recording::write::{self, WriteFormat};
+use evtach_host::recording::{self, ImuSample, OpenOptions};
 use proptest::prelude::*;
 use scratch::{Scratch, event, read};
 
@@ -99,5 +100,81 @@ fn time_that_steps_back_is_kept_where_the_format_can_hold_it() {
             write::create(&scratch.file(format.as_str()), format, GEOMETRY).expect("a file");
         let error = writer.write(&events).expect_err("holds no step back").to_string();
         assert!(error.contains("help:"), "{error}");
+    }
+}
+
+/// A thousand events and a gyro sample in each millisecond.
+fn with_gyro() -> (Vec<Event>, Vec<GyroSample>) {
+    let events =
+        (0..200_000_u32).map(|i| event(5000 + u64::from(i), (i % 1280) as u16, 3, i % 2 == 0));
+    let samples = (0..210_u16).map(|i| GyroSample {
+        t_us: u64::from(i) * 1000,
+        roll_rad_s: (f32::from(i) - 100.0) * 3.7e-3,
+    });
+    (events.collect(), samples.collect())
+}
+
+#[test]
+fn gyro_samples_come_back_before_the_events_of_their_time() {
+    let (events, samples) = with_gyro();
+    let scratch = Scratch::new();
+    let file = scratch.file("gyro.aedat4");
+    let mut writer = write::create(&file, WriteFormat::Aedat4, GEOMETRY).expect("a file");
+    let mut rest = &samples[..];
+    for events in events.chunks(777) {
+        let until_us = events[events.len() - 1].t_us;
+        let (reached, later) = rest.split_at(rest.partition_point(|s| s.t_us <= until_us));
+        let reached: Vec<ImuSample> = reached.iter().map(ImuSample::rolling).collect();
+        writer.write_imu(&reached).expect("samples that fit");
+        writer.write(events).expect("events that fit");
+        rest = later;
+    }
+    assert!(!rest.is_empty(), "some come behind the last event");
+    let rest: Vec<ImuSample> = rest.iter().map(ImuSample::rolling).collect();
+    writer.write_imu(&rest).expect("samples that fit");
+    writer.finish().expect("room on the disk");
+
+    let mut recording = recording::open(&file, &OpenOptions::default()).expect("what was written");
+    let (mut found, mut rolls) = (Vec::new(), Vec::<GyroSample>::new());
+    loop {
+        let more = recording.read_chunk(&mut found).expect("no damage");
+        rolls.extend(recording.take_imu().iter().map(ImuSample::roll));
+        let until_us = found.last().map_or(0, |event| event.t_us);
+        let due = samples.partition_point(|sample| sample.t_us <= until_us);
+        assert!(rolls.len() >= due, "{} of {due} samples at {until_us} us", rolls.len());
+        if !more {
+            break;
+        }
+    }
+    assert!(found == events);
+    assert_eq!(rolls.len(), samples.len());
+    for (found, sample) in rolls.iter().zip(&samples) {
+        assert_eq!(found.t_us, sample.t_us);
+        // Into degrees and back: each rounds once.
+        let off = (found.roll_rad_s - sample.roll_rad_s).abs();
+        assert!(off <= 2.0 * f32::EPSILON * sample.roll_rad_s.abs(), "{found:?} for {sample:?}");
+    }
+}
+
+#[test]
+fn a_recording_without_gyro_samples_declares_none() {
+    let (events, samples) = with_gyro();
+    let samples: Vec<ImuSample> = samples.iter().map(ImuSample::rolling).collect();
+    for format in WriteFormat::ALL {
+        let scratch = Scratch::new();
+        for (given, name) in [(&samples[..0], "without"), (&samples[..], "with")] {
+            let file = scratch.file(name);
+            let mut writer = write::create(&file, format, GEOMETRY).expect("a file");
+            writer.write_imu(given).expect("samples that fit, or have no place");
+            writer.write(&events).expect("events that fit");
+            writer.finish().expect("room on the disk");
+            let mut found = read(&file, None).expect("what was written");
+            assert!(found.error.is_none() && found.events == events, "{}", format.as_str());
+            let kept = if format.holds_imu() { given.len() } else { 0 };
+            assert_eq!(found.recording.take_imu().len(), kept, "{}", format.as_str());
+            let bytes = std::fs::read(&file).expect("what was written");
+            let declared = bytes.windows(4).any(|word| word == b"IMUS");
+            assert_eq!(declared, kept > 0, "{}", format.as_str());
+        }
     }
 }

@@ -2,6 +2,8 @@
 
 peers.py write EVENTS.npy WIDTH HEIGHT FOLDER   writes FOLDER/<peer>.<format>... for every peer and format
 peers.py read FOLDER                            reads FOLDER/<format>.* with every peer, saves <format>.<peer>.npy
+peers.py imu FILE                               prints FILE's inertial samples as dv-processing reads them, a line each:
+                                                us, then rates about x, y, z in rad/s, then acceleration in m/s^2
 peers.py time FILE                              decodes FILE with faery, prints events and seconds
 """
 
@@ -217,12 +219,22 @@ def read(folder):
         "evt3.raw": {"faery": read_faery},
         "dat": {"faery": read_faery, "expelliarmus": read_expelliarmus("dat")},
         "aedat4": {"faery": read_faery, "dv": read_dv},
+        "imu.aedat4": {"faery": read_faery, "dv": read_dv},
         "csv": {"faery": read_faery},
         "es": {"faery": read_faery},
         "npy": {"numpy": read_numpy},
     }.items():
         for peer, reader in peers.items():
             np.save(folder / f"{name}.{peer}.read.npy", reader(folder / f"ours.{name}"))
+
+
+def print_imu(path):
+    import dv_processing as dv
+
+    recording = dv.io.MonoCameraRecording(path)
+    while (batch := recording.getNextImuBatch()) is not None:
+        for sample in batch:
+            print(sample.timestamp, *sample.getAngularVelocities(), *sample.getAccelerations())
 
 
 def clock(path):
@@ -243,6 +255,8 @@ if __name__ == "__main__":
             write(events, int(width), int(height), folder)
         case ["read", folder]:
             read(folder)
+        case ["imu", path]:
+            print_imu(path)
         case ["time", path]:
             clock(path)
         case _:

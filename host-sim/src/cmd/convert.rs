@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Context, bail};
 use evtach_core::{Event, Geometry, Roi};
 use evtach_host::recording::write::{self, WriteFormat};
-use evtach_host::recording::{self, OpenOptions};
+use evtach_host::recording::{self, ImuSample, OpenOptions};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::how::parse_roi;
@@ -64,6 +64,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut picker = Picker::new(&args, format);
     let mut chunk: Vec<Event> = Vec::new();
     let mut picked: Vec<Event> = Vec::new();
+    let mut samples: Vec<ImuSample> = Vec::new();
     let mut failure = None;
     loop {
         chunk.clear();
@@ -77,7 +78,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         if !more {
             picker.flush(&mut picked);
         }
-        writer.write(&picked).with_context(|| args.output.display().to_string())?;
+        samples.append(&mut recording.take_imu());
+        writer
+            .write_imu(&picker.take_imu(&mut samples))
+            .and_then(|()| writer.write(&picked))
+            .with_context(|| args.output.display().to_string())?;
         bar.set_position(recording.bytes_read());
         if !more {
             break;
@@ -124,6 +129,8 @@ struct Picker {
     origin: Option<(u64, u64)>,
     seen: u64,
     written: u64,
+    /// Inertial samples that the format has no place for.
+    imu_left_out: usize,
     sorter: Option<Sorter>,
 }
 
@@ -142,6 +149,7 @@ impl Picker {
             origin: None,
             seen: 0,
             written: 0,
+            imu_left_out: 0,
             sorter: ordered.then(Sorter::default),
         }
     }
@@ -177,6 +185,24 @@ impl Picker {
         wanted
     }
 
+    /// The inertial samples of the part that is wanted. They wait for the first event, which says when it begins.
+    fn take_imu(&mut self, samples: &mut Vec<ImuSample>) -> Vec<ImuSample> {
+        let Some((first_us, shift_us)) = self.origin else { return Vec::new() };
+        let from_us = if self.start_us > 0 { first_us.saturating_add(self.start_us) } else { 0 };
+        let wanted_us = from_us..=first_us.saturating_add(self.end_us);
+        let wanted = samples.drain(..).filter(|sample| wanted_us.contains(&sample.t_us));
+        let mut wanted: Vec<ImuSample> = wanted
+            .filter_map(|sample| {
+                Some(ImuSample { t_us: sample.t_us.checked_sub(shift_us)?, ..sample })
+            })
+            .collect();
+        if !self.format.holds_imu() {
+            self.imu_left_out += wanted.len();
+            wanted.clear();
+        }
+        wanted
+    }
+
     fn origin(&mut self, t_us: u64) -> (u64, u64) {
         *self.origin.get_or_insert_with(|| {
             // A minute of headroom: the recording goes on from its first event.
@@ -203,6 +229,13 @@ impl Picker {
         eprintln!("{} events written", self.written);
         if left_out > 0 {
             eprintln!("{left_out} events left out by --decimate");
+        }
+        if self.imu_left_out > 0 {
+            eprintln!(
+                "{} inertial samples left out: {} has no place for them, aedat4 has",
+                self.imu_left_out,
+                self.format.as_str()
+            );
         }
         if out_of_bounds > 0 {
             eprintln!("{out_of_bounds} events outside the sensor left out");

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use anyhow::Context;
-use evtach_core::{Geometry, Roi, Settings};
+use evtach_core::{Geometry, GyroSample, Roi, Settings};
 use evtach_host::measure::Capacity;
-use evtach_host::recording::{self, OpenOptions, Recording};
+use evtach_host::recording::{self, ImuSample, OpenOptions, Recording};
 
 /// What is known better than the tachometer finds it, and the memory it is given.
 #[derive(clap::Args)]
@@ -28,6 +28,12 @@ pub struct How {
     /// One standard deviation of the camera clock's error.
     #[arg(long, value_name = "PPM", default_value_t = 15.0)]
     pub clock_ppm: f32,
+    /// Take the camera's own roll out of the speed by the recording's gyro, where it has one.
+    ///
+    /// The gyro's offset is found while measuring, in some seconds from the hand; --gyro-sigma tells how well it is known before. Its
+    /// axes are those of the cameras' documentation, not yet checked against a recording of a rolling camera.
+    #[arg(long)]
+    pub gyro: bool,
     /// One standard deviation of the gyro's zero-rate offset; 0.003 where it was calibrated on a still camera. Unless stated, that of
     /// data sheets.
     #[arg(long, value_name = "RAD/S", value_parser = parse_sigma)]
@@ -57,6 +63,19 @@ impl How {
             settings.gyro_sigma_rad_s = sigma_rad_s;
         }
         settings
+    }
+
+    /// What the gyro told of the camera's roll since the last call; nothing where it is not asked for.
+    pub fn rolls(&self, recording: &mut Recording) -> Vec<GyroSample> {
+        let samples = recording.take_imu();
+        if self.gyro { samples.iter().map(ImuSample::roll).collect() } else { Vec::new() }
+    }
+
+    /// Says on stderr that the gyro was asked for and is not in the recording.
+    pub fn note_gyro(&self, name: &str, found: bool) {
+        if self.gyro && !found {
+            eprintln!("{name}: no gyro samples; speeds are relative to the camera");
+        }
     }
 }
 

@@ -10,10 +10,10 @@ use evtach_core::{Event, GyroSample, Reading};
 use evtach_host::measure::{
     Capacity, Document, FileFacts, Ties, drain, evidence, feed, summarise, table, with_tachometer,
 };
-use evtach_host::recording::ImuSample;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::how::How;
+use super::wait::Wait;
 
 /// Arguments of `evtach measure`.
 #[derive(clap::Args)]
@@ -32,12 +32,6 @@ pub struct Args {
     /// End this many seconds after the first event.
     #[arg(long, value_name = "SECONDS")]
     end: Option<f64>,
-    /// Take the camera's own roll out of the speed by the recording's gyro, where it has one.
-    ///
-    /// The gyro's offset is found while measuring, in some seconds from the hand; --gyro-sigma tells how well it is known before. Its
-    /// axes are those of the cameras' documentation, not yet checked against a recording of a rolling camera.
-    #[arg(long)]
-    gyro: bool,
     /// Show what each stage found, and why something was refused.
     #[arg(short, long)]
     verbose: bool,
@@ -80,7 +74,7 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
     let mut failure = None;
     let ignored = with_tachometer(settings, args.how.capacity, |tachometer| {
         let (mut chunk, mut ties) = (Vec::<Event>::new(), Ties::default());
-        let mut rolls: Vec<GyroSample> = Vec::new();
+        let (mut rolls, mut wait) = (Vec::<GyroSample>::new(), Wait::default());
         let (mut origin_us, mut has_gyro) = (None, false);
         let (mut known_lost, mut measured) = (0, None::<(u64, u64)>);
         loop {
@@ -107,10 +101,10 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
                 let start_us = measured.map_or(first.t_us, |(start_us, _)| start_us);
                 measured = Some((start_us, last.t_us));
             }
-            let samples = recording.take_imu();
-            if args.gyro {
-                rolls.extend(samples.iter().map(ImuSample::roll));
-                has_gyro |= !samples.is_empty();
+            rolls.append(&mut args.how.rolls(&mut recording));
+            has_gyro |= !rolls.is_empty();
+            if args.how.gyro {
+                wait.hold(&mut chunk, &rolls, more);
             }
             let mut ahead = &rolls[..];
             feed(tachometer, &chunk, &mut ahead, |reading| readings.push(reading));
@@ -120,9 +114,7 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
                 break;
             }
         }
-        if args.gyro && !has_gyro {
-            eprintln!("{name}: no gyro samples; speeds are relative to the camera");
-        }
+        args.how.note_gyro(&name, has_gyro);
         (facts.first_us, facts.last_us) = measured.unwrap_or_default();
         tachometer.finish();
         drain(tachometer, |reading| readings.push(reading));

@@ -8,4 +8,5 @@ pub mod measure;
 pub mod plot;
 pub mod screen;
 pub mod synth;
+mod wait;
 pub mod watch;

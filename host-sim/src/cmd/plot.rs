@@ -6,7 +6,6 @@ use std::process::ExitCode;
 use anyhow::{Context, bail};
 use evtach_core::{Event, GyroSample};
 use evtach_host::measure::{FileFacts, measure_events, summarise};
-use evtach_host::recording::ImuSample;
 use evtach_host::report::{Subject, heat_map, html};
 
 use super::how::How;
@@ -43,7 +42,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
                 false
             }
         };
-        gyro.extend(recording.take_imu().iter().map(ImuSample::roll));
+        gyro.append(&mut args.how.rolls(&mut recording));
         if !more {
             break;
         }
@@ -54,18 +53,19 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         );
     };
     let (first_us, last_us) = (first.t_us, last.t_us);
+    args.how.note_gyro(&name, !gyro.is_empty());
     let settings = args.how.settings(recording.geometry);
-    let (readings, _) = measure_events(&events, &gyro, settings, args.how.capacity);
+    let (readings, thinned) = measure_events(&events, &gyro, settings, args.how.capacity);
     let summary = summarise(&readings, &(first_us..last_us), args.how.clock_ppm);
     let facts = FileFacts {
         file: name,
         format: recording.format.to_owned(),
         size_px: (recording.geometry.width_px, recording.geometry.height_px),
         events: events.len() as u64,
+        thinned,
         lost: recording.lost(),
         first_us,
         last_us,
-        ..FileFacts::default()
     };
     let subject = Subject {
         facts: &facts,

@@ -17,8 +17,8 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, bail};
 use evtach_core::Geometry;
-use evtach_host::recording::parse_geometry;
-use evtach_host::recording::write::{WriteFormat, create};
+use evtach_host::recording::write::{WriteFormat, Writer, create};
+use evtach_host::recording::{ImuSample, RecordingError, parse_geometry};
 use evtach_host::synth::presets::Preset;
 use evtach_host::synth::{Model, Scene, Synthetic, generate};
 use serde_json::Value;
@@ -90,7 +90,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         made?
     };
     let mut writer = create(&args.out, format, geometry)?;
-    writer.write(&made.events)?;
+    write(&mut writer, &made)?;
     writer.finish()?;
     let truth = args.truth.clone().or_else(|| truth_path(&args.out));
     if let Some(path) = &truth {
@@ -98,6 +98,22 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     report(&args.out, format, &made, truth.as_deref());
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes gyro samples and events side by side in time, as a camera's recorder does.
+fn write(writer: &mut Writer, made: &Synthetic) -> Result<(), RecordingError> {
+    const PIECE_EVENTS: usize = 4096;
+    let samples: Vec<ImuSample> = made.gyro.iter().map(ImuSample::rolling).collect();
+    let mut samples = &samples[..];
+    for events in made.events.chunks(PIECE_EVENTS) {
+        let until_us = events.last().map_or(0, |event| event.t_us);
+        let (reached, later) =
+            samples.split_at(samples.partition_point(|sample| sample.t_us <= until_us));
+        writer.write_imu(reached)?;
+        writer.write(events)?;
+        samples = later;
+    }
+    writer.write_imu(samples)
 }
 
 fn report(out: &Path, format: WriteFormat, made: &Synthetic, truth: Option<&Path>) {
@@ -121,6 +137,10 @@ fn report(out: &Path, format: WriteFormat, made: &Synthetic, truth: Option<&Path
             r.centre_px[0],
             r.centre_px[1]
         );
+    }
+    if !made.gyro.is_empty() && !format.holds_imu() {
+        let kept = if truth.is_some() { "in the truth alone" } else { "nowhere" };
+        eprintln!("  gyro samples: {kept}, {} has no place for them; aedat4 has", format.as_str());
     }
     if let Some(path) = truth {
         eprintln!("  truth: {}", path.display());

@@ -8,7 +8,6 @@ mod ties;
 
 use std::borrow::Cow;
 
-use evtach_core::Ignored;
 use evtach_core::limits::{DEVICE_EVENTS, DEVICE_HEAT_CELLS, POLAR_EVENTS, VISITS};
 use evtach_core::speed::polar::PolarEvents;
 use evtach_core::{
@@ -126,14 +125,14 @@ pub fn drain(tachometer: &mut Tachometer<'_>, mut reading: impl FnMut(Reading)) 
     }
 }
 
-/// A whole recording in memory, measured.
+/// A whole recording in memory, measured: the readings, and how many events were left out on purpose.
 #[must_use]
 pub fn measure_events(
     events: &[Event],
     samples: &[GyroSample],
     settings: Settings,
     capacity: Capacity,
-) -> (Vec<Reading>, Ignored) {
+) -> (Vec<Reading>, u64) {
     with_tachometer(settings, capacity, |tachometer| {
         let mut readings = Vec::new();
         let mut samples = samples;
@@ -144,6 +143,6 @@ pub fn measure_events(
         feed(tachometer, &events, &mut samples, |reading| readings.push(reading));
         tachometer.finish();
         drain(tachometer, |reading| readings.push(reading));
-        (readings, tachometer.ignored())
+        (readings, tachometer.thinned())
     })
 }

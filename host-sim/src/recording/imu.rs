@@ -20,6 +20,16 @@ pub struct ImuSample {
 }
 
 impl ImuSample {
+    /// What the sensor of an upright camera tells that only rolls: the other way round of [`Self::roll`].
+    #[must_use]
+    pub fn rolling(sample: &GyroSample) -> Self {
+        Self {
+            t_us: sample.t_us,
+            gyro_rad_s: [0.0, 0.0, -sample.roll_rad_s],
+            accel_m_s2: [0.0, -GRAVITY_M_S2, 0.0],
+        }
+    }
+
     /// Roll about the optical axis as the core wants it: a camera that turns clockwise makes a still scene turn
     /// counter-clockwise on the screen.
     #[must_use]
@@ -36,4 +46,14 @@ pub(crate) fn from_degrees(rate: [f32; 3]) -> [f32; 3] {
 /// From multiples of gravity.
 pub(crate) fn from_gravities(acceleration: [f32; 3]) -> [f32; 3] {
     acceleration.map(|value| value * GRAVITY_M_S2)
+}
+
+/// To degrees per second.
+pub(crate) fn to_degrees(rate: [f32; 3]) -> [f32; 3] {
+    rate.map(f32::to_degrees)
+}
+
+/// To multiples of gravity.
+pub(crate) fn to_gravities(acceleration: [f32; 3]) -> [f32; 3] {
+    acceleration.map(|value| value / GRAVITY_M_S2)
 }

@@ -12,6 +12,7 @@ use super::dat::DatWriter;
 use super::error::RecordingError;
 use super::es::EsWriter;
 use super::ev8::Ev8Writer;
+use super::imu::ImuSample;
 use super::npy::NpyWriter;
 use super::raw::{Evt2Writer, Evt3Writer};
 use super::spi::SpiWriter;
@@ -83,6 +84,12 @@ impl WriteFormat {
         }
     }
 
+    /// Whether inertial samples have a place in it.
+    #[must_use]
+    pub const fn holds_imu(self) -> bool {
+        matches!(self, Self::Aedat4)
+    }
+
     /// The format a file name asks for: by `.evt2.raw` and the like, else by its extension (`.raw` is EVT 3.0).
     #[must_use]
     pub fn from_path(path: &Path) -> Option<Self> {
@@ -128,6 +135,15 @@ impl Writer {
         self.sink.write(events)
     }
 
+    /// Appends inertial samples, before the events of their time. Formats that have no place for them
+    /// ([`WriteFormat::holds_imu`]) leave them out.
+    ///
+    /// # Errors
+    /// When the disk or pipe fails.
+    pub fn write_imu(&mut self, samples: &[ImuSample]) -> Result<(), RecordingError> {
+        self.sink.write_imu(samples)
+    }
+
     /// Closes the recording.
     ///
     /// # Errors
@@ -170,6 +186,9 @@ pub fn create(
 /// One format's writer.
 pub(crate) trait Sink: Send {
     fn write(&mut self, events: &[Event]) -> Result<(), RecordingError>;
+    fn write_imu(&mut self, _samples: &[ImuSample]) -> Result<(), RecordingError> {
+        Ok(())
+    }
     fn finish(self: Box<Self>) -> Result<(), RecordingError>;
 }
 

@@ -4,7 +4,7 @@ mod heat;
 mod phase;
 mod speed;
 
-use evtach_core::{Event, Geometry, Reading};
+use evtach_core::{Event, Frame, Geometry, Reading};
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::style::RGBColor;
 
@@ -70,6 +70,12 @@ pub fn html(subject: &Subject<'_>) -> Result<String, ReportError> {
     let mut body = format!("<h1>{title}</h1>\n");
     let told = table(subject.facts, subject.summary, subject.readings);
     body += &format!("<pre>{}</pre>\n", escaped(&told));
+    for rotor in &subject.summary.rotors {
+        if let Some(speed) = rotor.speed {
+            let (name, frame) = (letter(rotor.id), relative(speed.frame));
+            body += &format!("<p>Rotor {name}: relative to the {frame}.</p>\n");
+        }
+    }
     for assumed in subject.assumed {
         body += &format!("<p>Assumed: {}.</p>\n", escaped(assumed));
     }
@@ -109,6 +115,14 @@ pub fn heat_map(subject: &Subject<'_>) -> Result<String, ReportError> {
 const STYLE: &str = "body{font:16px/1.5 sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}\
     pre{background:#f6f6f6;padding:1rem;overflow-x:auto;font-size:13px}svg{max-width:100%;height:auto}";
 
+/// What a speed is relative to, in the word of the JSON, and what that means.
+const fn relative(frame: Frame) -> &'static str {
+    match frame {
+        Frame::Camera => "camera; its own roll is in the speed, and in the error bar",
+        Frame::Room => "room; the camera's own roll has been taken out by its gyro",
+    }
+}
+
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
@@ -147,6 +161,7 @@ mod tests {
         assert_eq!(summary.rotors[0].speed.unwrap().direction(), Direction::Cw);
         assert_eq!(page.matches("<svg").count(), 3);
         assert!(page.contains("Rotor A: phase"));
+        assert!(page.contains("Rotor A: relative to the camera;"));
         assert!(page.contains("a&lt;b&gt;.raw") && !page.contains("a<b>"));
         assert!(page.contains("640x480 &amp; more"));
     }
@@ -156,6 +171,6 @@ mod tests {
         let scene = Scene { rotors: Vec::new(), ..Scene::default() };
         let (page, _) = report_of(&scene);
         assert_eq!(page.matches("<svg").count(), 1);
-        assert!(page.contains("No reading has a speed."));
+        assert!(page.contains("No reading has a speed.") && !page.contains("relative to"));
     }
 }

@@ -5,6 +5,7 @@ mod bad_input;
 mod contract;
 mod convert;
 mod demo;
+mod gyro;
 mod screen;
 
 use std::path::{Path, PathBuf};

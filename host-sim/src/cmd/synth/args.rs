@@ -84,7 +84,7 @@ pub struct MotionArgs {
     /// Steady roll of the image in rad/s.
     #[arg(long, allow_negative_numbers = true)]
     roll: Option<f64>,
-    /// Gyro samples.
+    /// Gyro samples: in the truth, and in a recording that is written as aedat4.
     #[arg(long)]
     gyro: bool,
     /// Gyro samples per second.

@@ -1,5 +1,6 @@
 //! iniVation AEDAT 4: flatbuffers in packets, uncompressed, LZ4 or Zstandard.
 
+mod build;
 mod flat;
 mod header;
 mod packet;
@@ -11,6 +12,11 @@ pub(crate) use write::Aedat4Writer;
 
 /// First bytes of the file.
 pub(crate) const MAGIC: &[u8] = b"#!AER-DAT4.0\r\n";
+
+/// Number of the stream of events where it is written here.
+const EVENT_STREAM: i32 = 0;
+/// Number of the stream of inertial samples where it is written here.
+const IMU_STREAM: i32 = 1;
 
 /// How packets are compressed (`CompressionType` of the format).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,0 +1,94 @@
+//! The camera's roll, from `evtach synth` by way of a file to the speed in the room.
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use super::{Run, evtach, folder};
+
+/// Makes the hand-held recording in a folder; where it is, its truth, and what was said.
+fn handheld(folder: &TempDir, name: &str) -> (String, Value, Run) {
+    let file = folder.path().join(name).display().to_string();
+    let truth = folder.path().join("truth.json").display().to_string();
+    // Both a tremor and a steady roll: the speeds relative to room and camera are 3 rpm apart.
+    let scene = ["--preset", "handheld", "--roll", "0.3", "--duration-ms", "300", "--seed", "7"];
+    let run = evtach(&[&["synth", &file, "--truth", &truth][..], &scene].concat(), b"");
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let text = std::fs::read_to_string(truth).expect("the truth beside it");
+    (file, serde_json::from_str(&text).expect("JSON"), run)
+}
+
+/// Speed with sign, its standard deviation, and its frame, of the one rotor.
+fn speed(file: &str, options: &[&str]) -> (f64, f64, String) {
+    let run = evtach(&[&["measure", "--json", file], options].concat(), b"");
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let document: Value = serde_json::from_str(&run.stdout).expect("one JSON document");
+    let rotor = &document["rotors"][0];
+    let number = |name: &str| rotor[name].as_f64().expect("a number");
+    let sign = if rotor["direction"] == "cw" { 1.0 } else { -1.0 };
+    let frame = rotor["frame"].as_str().expect("a frame");
+    (sign * number("rpm"), number("rpm_sigma"), frame.to_owned())
+}
+
+#[test]
+fn the_gyro_in_a_recording_gives_the_speed_in_the_room() {
+    let folder = folder();
+    let (file, truth, said) = handheld(&folder, "hand.aedat4");
+    assert!(!said.stderr.contains("no place"), "{}", said.stderr);
+    let true_rpm = |name: &str| truth["rotors"][0][name].as_f64().expect("a speed");
+    let converted = folder.path().join("again.aedat4").display().to_string();
+    let run = evtach(&["convert", &file, &converted, "--rebase"], b"");
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+
+    for file in [&file, &converted] {
+        for capacity in ["full", "device"] {
+            let asked = ["--gyro", "--gyro-sigma", "0.003", "--capacity", capacity];
+            let (rpm, sigma, frame) = speed(file, &asked);
+            let off = rpm - true_rpm("rpm_room_mean_signed");
+            println!("{capacity}: {rpm:.3} ± {sigma:.3} rpm in the room, off by {off:+.3}");
+            assert_eq!(frame, "room");
+            assert!(off.abs() < 4.0 * sigma && sigma < 0.3, "off by {off:+.3} ± {sigma:.3} rpm");
+
+            let (rpm, sigma, frame) = speed(file, &["--capacity", capacity]);
+            let off = rpm - true_rpm("rpm_camera_mean_signed");
+            println!("{capacity}: {rpm:.3} ± {sigma:.3} rpm by the camera, off by {off:+.3}");
+            assert_eq!(frame, "camera");
+            assert!(off.abs() < 4.0 * sigma, "off by {off:+.3} ± {sigma:.3} rpm");
+        }
+    }
+}
+
+#[test]
+fn a_report_takes_the_gyro_as_a_measurement_does() {
+    let folder = folder();
+    let (file, ..) = handheld(&folder, "hand.aedat4");
+    let out = folder.path().join("report.html").display().to_string();
+    for (options, frame) in
+        [(&["--gyro", "--gyro-sigma", "0.003"][..], "room"), (&["--gyro-sigma", "0.003"], "camera")]
+    {
+        let run = evtach(&[&["plot", &file, "--out", &out], options].concat(), b"");
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        let page = std::fs::read_to_string(&out).expect("the report");
+        assert!(page.contains(&format!("Rotor A: relative to the {frame};")), "{frame}");
+        // The rotor's line of either command, word for word.
+        let table = evtach(&[&["measure", &file], options].concat(), b"").stdout;
+        let rotor = table.lines().nth(1).expect("a line for the rotor");
+        assert!(rotor.contains(" rpm cw") && page.contains(rotor), "{rotor}");
+    }
+}
+
+#[test]
+fn a_recording_without_gyro_samples_says_so() {
+    let folder = folder();
+    let (file, _, said) = handheld(&folder, "hand.raw");
+    assert!(said.stderr.contains("evt3 has no place for them"), "{}", said.stderr);
+    let out = folder.path().join("report.html").display().to_string();
+    for command in [&["measure", &file, "--gyro"][..], &["plot", &file, "--gyro", "--out", &out]] {
+        let run = evtach(command, b"");
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        assert!(run.stderr.contains("no gyro samples"), "{}", run.stderr);
+    }
+    let (file, ..) = handheld(&folder, "hand.aedat4");
+    let run = evtach(&["convert", &file, &out, "--to", "evt3"], b"");
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert!(run.stderr.contains("inertial samples left out"), "{}", run.stderr);
+}
