@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Every check, and the tools they need. Continuous integration and people run this very script.
 #
-#   ./ci.sh            all steps, in this order: install format lint test board docs image budget fuzz deny
+#   ./ci.sh            all steps, in this order: install format lint test bench board docs image budget fuzz deny
 #   ./ci.sh STEP...    only these
 #
 # Not more than half an hour on two cores from nothing; a few minutes when built before.
@@ -64,6 +64,12 @@ step_lint() {
 
 step_test() {
   cargo test --workspace
+}
+
+# A minute of the accuracy tables: both fail where a reading is more than 1 % off or told where no rotor is.
+step_bench() {
+  cargo run --release -p evtach-host --bin evtach -- bench blind --quick
+  cargo run --release -p evtach-host --bin evtach -- bench trust --quick
 }
 
 # The emulated STM32F746G-DISCO itself, which is a workspace of its own; `test` runs the device's image on it.
@@ -137,10 +143,10 @@ step_deny() {
 }
 
 steps=("$@")
-[ ${#steps[@]} -gt 0 ] || steps=(install format lint test board docs image budget fuzz deny)
+[ ${#steps[@]} -gt 0 ] || steps=(install format lint test bench board docs image budget fuzz deny)
 for step in "${steps[@]}"; do
   if ! declare -F "step_$step" >/dev/null; then
-    echo "ci.sh: no step \"$step\": choose from install format lint test board docs image budget fuzz deny"
+    echo "ci.sh: no step \"$step\": choose from install format lint test bench board docs image budget fuzz deny"
     exit 2
   fi
 done

@@ -86,6 +86,7 @@ pub fn run(args: &Args) -> anyhow::Result<Report> {
         name: "accuracy",
         tables: tables::tables(&cells, &models, seeds),
         records: cells.records(),
+        ..Report::default()
     })
 }
 

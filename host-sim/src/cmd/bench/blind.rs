@@ -2,7 +2,7 @@
 //!
 //! Right: within 1 % and with the right direction. A reading is owed where the window holds three symmetry periods and two
 //! turns (2 s at most), the rotor makes 2000 events a turn, and the blades pass at most 150 000 times a minute; elsewhere
-//! a refusal is as good as a reading. A wrong reading is wrong everywhere.
+//! a refusal is as good as a reading. A wrong reading is wrong everywhere, and makes the exit code 1.
 
 use evtach_core::{Geometry, Settings};
 use evtach_host::synth::{Model, Motion, generate};
@@ -51,6 +51,7 @@ struct Outcome {
     rpm: f64,
     blades: u8,
     model: Model,
+    seed: u64,
     capacity: Capacity,
     owed: bool,
     verdict: Verdict,
@@ -93,6 +94,7 @@ pub fn run(args: &Args) -> anyhow::Result<Report> {
         name: "blind",
         tables: tables.into(),
         records: outcomes.iter().map(record).collect(),
+        wrong: outcomes.iter().filter_map(wrong).collect(),
     })
 }
 
@@ -126,7 +128,7 @@ fn measure(condition: &Condition, seed: u64) -> anyhow::Result<[Outcome; 2]> {
             blades_right = found.is_some_and(|s| s.blades == Some(condition.blades));
         }
         let Condition { rpm, blades, model, .. } = *condition;
-        Outcome { rpm, blades, model, capacity, owed, verdict, blades_right }
+        Outcome { rpm, blades, model, seed, capacity, owed, verdict, blades_right }
     }))
 }
 
@@ -174,17 +176,31 @@ fn table(
     Table { title, notes, columns, rows }
 }
 
+/// Names the recording that was read wrongly.
+fn wrong(o: &Outcome) -> Option<String> {
+    (o.verdict == Verdict::Wrong).then(|| {
+        let Outcome { rpm, blades, seed, .. } = o;
+        let (model, capacity) = (model_name(o.model), o.capacity.as_str());
+        format!(
+            "wrong reading: {rpm} rpm, {blades} blades, seed {seed}, {model} model, {capacity} memory"
+        )
+    })
+}
+
+fn model_name(model: Model) -> &'static str {
+    if model == Model::Edge { "edge" } else { "threshold" }
+}
+
 fn record(o: &Outcome) -> Map<String, Value> {
     let verdict = match o.verdict {
         Verdict::Right => "right",
         Verdict::Wrong => "wrong",
         Verdict::Refused => "refused",
     };
-    let model = if o.model == Model::Edge { "edge" } else { "threshold" };
     let pairs: [(&str, Value); 7] = [
         ("rpm", o.rpm.into()),
         ("blades", o.blades.into()),
-        ("model", model.into()),
+        ("model", model_name(o.model).into()),
         ("capacity", o.capacity.as_str().into()),
         ("owed", o.owed.into()),
         ("verdict", verdict.into()),

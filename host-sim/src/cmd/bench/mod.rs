@@ -99,5 +99,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(common) = common {
         report.print(&common)?;
     }
-    Ok(ExitCode::SUCCESS)
+    // Not to stdout, which may hold records for a program.
+    for wrong in &report.wrong {
+        eprintln!("{wrong}");
+    }
+    Ok(if report.wrong.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

@@ -94,6 +94,7 @@ pub fn run(args: &Args) -> anyhow::Result<Report> {
         name: "peers",
         tables: vec![table(&rows, seeds)],
         records: rows.iter().map(Row::record).collect(),
+        ..Report::default()
     })
 }
 

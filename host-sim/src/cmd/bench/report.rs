@@ -29,6 +29,8 @@ pub struct Report {
     pub tables: Vec<Table>,
     /// For programs: one flat object a cell.
     pub records: Vec<Map<String, Value>>,
+    /// What was read wrongly, for a benchmark that must not find any.
+    pub wrong: Vec<String>,
 }
 
 impl Report {

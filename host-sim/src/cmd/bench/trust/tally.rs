@@ -88,9 +88,25 @@ impl Tally {
     }
 }
 
+/// Names the scene where speeds were wrong, or were told where no rotor is.
+fn wrong(trial: &Trial) -> impl Iterator<Item = String> + '_ {
+    let of = |outcome: &Outcome| {
+        let Outcome { capacity, wrong, speeds, ghosts, .. } = outcome;
+        (wrong + ghosts > 0).then(|| {
+            format!(
+                "wrong readings: {wrong} of {speeds} speeds more than 1 % off, {ghosts} where no rotor is, {capacity} memory; \
+                 bench trust --show {} prints the scene",
+                trial.trial
+            )
+        })
+    };
+    trial.results.iter().filter_map(of)
+}
+
 /// The report over all trials.
 pub fn report(trials: &[Trial]) -> Report {
-    let mut report = Report { name: "trust", ..Report::default() };
+    let wrong = trials.iter().flat_map(wrong).collect();
+    let mut report = Report { name: "trust", wrong, ..Report::default() };
     for capacity in Capacity::ALL {
         let mut tally = Tally::default();
         for trial in trials {
@@ -159,5 +175,8 @@ mod tests {
         assert_eq!((tally.within_95, tally.beyond_6, tally.with_sigma), (1, 1, 2));
         assert_eq!((tally.ghost_scenes, tally.still_scenes, tally.ghosts), (1, 1, 0));
         assert_eq!(tally.reasons, vec![("no_rotation".to_owned(), 2)]);
+        assert_eq!(wrong(&turning).count(), 0);
+        let named: Vec<_> = wrong(&still).collect();
+        assert!(named.len() == 1 && named[0].contains("--show 1 "), "{named:?}");
     }
 }
