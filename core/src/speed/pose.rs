@@ -53,6 +53,8 @@ const TOGETHER: f32 = 0.75;
 
 /// Phase at the rim, in radians of a doubled harmonic, by which the path may still move when it is doubled.
 const MOST_OFF_RAD: f32 = 1.0;
+/// Phase at the rim by which a correction moves a path that has not arrived: one correction turns a knot by one radian at most.
+const UNDER_WAY_RAD: f32 = 0.9;
 
 /// Root mean square speed of the axis in px/s from which on the camera moves: a hand makes some 80, and what few events scatter by
 /// looks like 20.
@@ -351,8 +353,9 @@ impl Pose {
         // The path comes first: all events correct it by this template before one of twice the harmonic is believed.
         let waits = self.schedule.phase() >= Phase::All && self.phases.is_none();
         // Nor while the path still moves by more than it reaches.
-        let off_rad = moved_px * (2 * self.harmonic) as f32 / self.disc.radius_px;
-        let strays = self.phases.is_some() && moved_px >= SETTLED_PX && off_rad > MOST_OFF_RAD;
+        let moved_rad = moved_px * self.harmonic as f32 / self.disc.radius_px;
+        let corrected = self.phases.is_some();
+        let strays = corrected && moved_px >= SETTLED_PX && 2.0 * moved_rad > MOST_OFF_RAD;
         let sharper = (at_high > at_low || shows(least)) && self.may_double() && !waits && !strays;
         // Few events show it as well as many, but a path does not follow them.
         self.overtone = if shows(SHARP_COHERENCE) && !sharper { at_high } else { 0.0 };
@@ -362,7 +365,8 @@ impl Pose {
             self.first_coherence = self.coherence;
         }
         self.phases = Some(if sharper { &sums.high } else { &sums.low }.phases(&sums.counts));
-        if self.schedule.advance(if sharper { f32::MAX } else { moved_px }) {
+        let under_way = corrected && moved_rad > UNDER_WAY_RAD;
+        if self.schedule.advance(if sharper { f32::MAX } else { moved_px }, under_way) {
             self.divide();
             let moves = self.drift_px_s() > MOVING_PX_S;
             if moves && self.schedule.reaches_out() && self.harmonic > self.first_harmonic {

@@ -34,6 +34,8 @@ pub struct Schedule {
 
 /// Most events of a rotor that was followed that are looked at: a PC keeps up with twenty readings a second of it.
 const MOST_FOLLOWED: usize = 65_536;
+/// Rounds of a later phase at most while each moves the path as far as one can.
+const MOST_ROUNDS: u8 = 6;
 /// Blocks of the path in the first two phases.
 const FIRST_BLOCKS: usize = 12;
 const SECOND_BLOCKS: usize = 24;
@@ -89,10 +91,13 @@ impl Schedule {
         self.phase < Phase::All
     }
 
-    /// Ends a round that moved the rim by so much; `true` when a new phase begins.
-    pub fn advance(&mut self, moved_px: f32) -> bool {
+    /// Ends a round that moved the rim by so much, `under_way` as far as one can; `true` when a new phase begins.
+    pub fn advance(&mut self, moved_px: f32, under_way: bool) -> bool {
         self.round += 1;
         let most = self.most.get(self.phase as usize).copied().unwrap_or(0);
+        // A motor that hunts is far from what was known of it.
+        let farther = under_way && self.phase >= Phase::Fine;
+        let most = if farther { most.max(MOST_ROUNDS) } else { most };
         // In the first fine round the harmonic is not raised yet.
         let settled = moved_px < SETTLED_PX && (self.phase != Phase::Fine || self.round > 1);
         if !settled && self.round < most {
