@@ -67,6 +67,8 @@ pub struct Store<'m> {
     start_us: u64,
     segment_us: u32,
     thinned: u64,
+    /// Where the stream began.
+    began_us: u64,
     /// A gyro sample of a time behind the open segment.
     ahead: Option<GyroSample>,
     /// The camera's roll in all segments that went by, and in those given up behind the ones that are measured.
@@ -91,6 +93,7 @@ impl<'m> Store<'m> {
             start_us: 0,
             segment_us: segment_us.max(1),
             thinned: 0,
+            began_us: 0,
             ahead: None,
             rolled: Roll::NONE,
             rolled_behind: Roll::NONE,
@@ -104,6 +107,7 @@ impl<'m> Store<'m> {
         self.closed = 0;
         self.held = Held::default();
         self.start_us = start_us;
+        self.began_us = start_us;
         self.segment_us = segment_us.max(1);
         self.ahead = None;
         self.rolled_behind = Roll::NONE;

@@ -104,6 +104,8 @@ impl Icp {
     ///
     /// `start_rad` is the yaw to start from, `radius_px` the rotor's radius. A way also ends when an iteration turns by
     /// less than `settled` of what the scatter of the matches leaves the yaw uncertain by.
+    // Not inlined: flash is short.
+    #[inline(never)]
     pub fn start(&mut self, start_rad: f32, radius_px: f32, residual: Residual, settled: f32) {
         self.run = Run { radius_px, residual, settled, ..Run::EMPTY };
         self.start_half(start_rad);

@@ -81,6 +81,8 @@ pub struct Pairs {
     registering: bool,
     /// Mean rate of the path's turn over the window in rad/s; `None`: yaws are taken as they are.
     even_rad_s: Option<f32>,
+    /// Time at the window's start that no pair is cut from, where there is room.
+    unsettled_us: f32,
     yaws: Vec<f32, MAX_PAIRS>,
     /// How many of the pairs share no slice with another.
     independent: f32,
@@ -106,6 +108,7 @@ impl Pairs {
             folds,
             registering: false,
             even_rad_s: None,
+            unsettled_us: 0.0,
             yaws: Vec::new(),
             independent,
         }
@@ -154,13 +157,21 @@ impl Pairs {
         self.even_rad_s = Some(even_rad_s);
     }
 
+    /// Cuts no pair from so long a time at the window's start, where there is room.
+    pub const fn settle(&mut self, unsettled_us: f32) {
+        self.unsettled_us = unsettled_us;
+    }
+
     /// Baseline and span of a slice, in microseconds, and when the next pair starts.
+    // Not inlined: flash is short.
+    #[inline(never)]
     fn times_us(&self, window: &Window<'_>) -> (f32, f32, f32) {
         let period_us = self.pace.period_us();
         let baseline_us = self.periods * period_us;
         let span_us = (self.folds as f32 - 1.0 + SLICE_PERIODS) * period_us;
-        let room_us = (window.duration_us as f32 - baseline_us - span_us).max(0.0);
-        (baseline_us, span_us, self.apart_us(room_us) * self.next as f32)
+        let all_us = (window.duration_us as f32 - baseline_us - span_us).max(0.0);
+        let room_us = (all_us - self.unsettled_us).max(0.0);
+        (baseline_us, span_us, all_us - room_us + self.apart_us(room_us) * self.next as f32)
     }
 
     /// By how much the pair turns beyond the window's mean speed, along the path.

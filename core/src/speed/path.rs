@@ -90,6 +90,8 @@ impl Path {
 
     /// Where the rotor was `t_us` after the middle of the window.
     #[must_use]
+    // Not inlined: flash is short.
+    #[inline(never)]
     pub fn at(&self, t_us: f32) -> Knot {
         self.between(self.place(t_us))
     }

@@ -122,6 +122,9 @@ pub struct Pose {
     /// beside them hold few events.
     even_share: f32,
     started: bool,
+    /// Time from the window's start on that a pixel may take to its first events of the stream, where that is a small part of the
+    /// window: 0 in all later windows.
+    unsettled_us: f32,
     schedule: Schedule,
     /// Segment of the window that is looked at next.
     segment: usize,
@@ -164,6 +167,7 @@ impl Pose {
             events: 0,
             even_share: 1.0,
             started: false,
+            unsettled_us: 0.0,
             schedule: Schedule::NEW,
             segment: 0,
             slope: None,
@@ -281,6 +285,7 @@ impl Pose {
             let annulus = Annulus::of(self.disc);
             if even.weigh(window, |event| annulus.place(event).is_some()) {
                 self.started = true;
+                self.unsettled_us = self.unsettled_us(window);
                 self.events = even.count();
                 self.even_share = even.share();
                 *even = Even::EMPTY;
@@ -389,6 +394,8 @@ impl Pose {
     }
 
     /// Learns the template of half the harmonic about the path as it is; for good, it goes no higher again.
+    // Not inlined: flash is short.
+    #[inline(never)]
     const fn halve(&mut self, for_good: bool) {
         self.harmonic /= 2;
         if for_good {

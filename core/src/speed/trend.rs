@@ -86,6 +86,12 @@ impl Points<'_> {
 }
 
 impl Trend {
+    /// By how much it is bent beside the bend: the mean square of (3 u^2 - 1) / 6 is 1 / 45.
+    #[must_use]
+    pub fn bent_beside_bend(&self) -> f32 {
+        self.bent - self.bend * self.bend / 45.0
+    }
+
     /// Fits a trend, with an offset of its own for every `fold`-th point: points i and i + fold share one. `None` when
     /// too few points are left. At most [`MOST_POINTS`] count. Cost: about 10 instructions a point and degree squared.
     #[must_use]
@@ -262,6 +268,8 @@ mod tests {
         // What is left of sin(pi u) beside its own slope of 3 / pi.
         let bent = 0.05 * 0.05 * 0.196;
         assert!((found.bent / bent - 1.0).abs() < 0.2, "{found:?}");
+        let parabola = Trend::fit(&points(1e-3, |u| 0.3 * u + 0.1 * u * u), 1).unwrap_or_default();
+        assert!(parabola.bent > 4e-4 && parabola.bent_beside_bend().abs() < 1e-5, "{parabola:?}");
         let straight = Trend::fit(&points(1e-3, |u| 0.3 * u), 1).unwrap_or_default();
         assert!(straight.bent < 1e-7, "{straight:?}");
     }

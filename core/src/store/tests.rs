@@ -33,6 +33,18 @@ fn a_segment_keeps_a_dense_burst_then_thins_evenly_and_counts_all() {
 }
 
 #[test]
+fn the_first_window_is_the_one_that_the_stream_begins_with() {
+    let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
+    let mut store = Store::new(&mut memory, MOST_SPARE, 100);
+    store.restart(1_000, 100);
+    fill(&mut store, 1_000..1_400);
+    store.lengthen(200);
+    assert!(store.window(2, u64::MAX).is_first());
+    store.drop_oldest();
+    assert!(!store.window(1, u64::MAX).is_first());
+}
+
+#[test]
 fn a_segment_that_is_not_full_keeps_all() {
     let mut memory = [StoredEvent::default(); 64 * MOST_SEGMENTS];
     let mut store = Store::new(&mut memory, MOST_SPARE, 100);

@@ -24,7 +24,7 @@ impl Store<'_> {
         };
         let duration_us = (segment_us * segments as u32)
             .min(end_us.saturating_sub(start_us).min(u64::from(u32::MAX)) as u32);
-        Window { parts, start_us, duration_us, segments }
+        Window { parts, start_us, duration_us, segments, first: start_us == self.began_us }
     }
 
     /// Events counted, kept and lost in the oldest `segments` segments.
@@ -74,6 +74,7 @@ pub struct Window<'a> {
     /// Length in microseconds.
     pub duration_us: u32,
     segments: usize,
+    first: bool,
 }
 
 impl<'a> Window<'a> {
@@ -81,6 +82,12 @@ impl<'a> Window<'a> {
     pub fn events(&self) -> impl Iterator<Item = StoredEvent> + use<'a> {
         let parts = self.parts;
         parts.into_iter().take(self.segments).flat_map(|part| part.iter().copied())
+    }
+
+    /// Whether the stream, or what is left of it, begins with this window.
+    #[must_use]
+    pub const fn is_first(&self) -> bool {
+        self.first
     }
 
     /// Number of stored events.

@@ -63,6 +63,8 @@ impl Extraction {
         }
     }
 
+    // Not inlined: flash is short.
+    #[inline(never)]
     pub(super) fn next_slow(&mut self) {
         let (Some(line), Some(disc)) = (self.lines.pop(), self.swept) else { return self.end() };
         self.line = line;

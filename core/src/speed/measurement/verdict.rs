@@ -181,6 +181,8 @@ impl Measurement {
 
     /// Whether the refinement, which knows nothing of harmonics, saw another speed: about a wrong centre a neighbour of the right
     /// harmonic keeps step, and leads the lock to its own speed.
+    // Not inlined, as other things that are asked once a reading: flash is short.
+    #[inline(never)]
     fn refinement_denies(&self, omega_rad_s: f32) -> bool {
         let (Some(refined), Some(sigma)) =
             (self.evidence.refined_rad_s, self.evidence.refined_sigma_rad_s)

@@ -6,9 +6,10 @@ use super::super::baseline::Estimate;
 use super::super::path::Knot;
 use super::super::statistics::student_over_normal;
 use super::super::trend::{Point, Trend};
-use super::{Pose, Sums};
+use super::{MOVING_PX_S, Pose, Sums};
 use crate::limits::MAX_KNOTS;
 use crate::math::{TAU, larger, sqrt};
+use crate::store::Window;
 
 /// Symmetry periods in the window from which on places in the period get offsets of their own.
 const FOLDED_PERIODS: usize = 3;
@@ -17,6 +18,15 @@ const DRIFT_BLOCKS: usize = 12;
 /// No rotor turns by this share of a cycle of its harmonic beyond an even turn from a block to the next: the path has slipped to another
 /// edge of the template. Blocks of the fewest events scatter by a tenth of a cycle.
 const SLIP_CYCLES: f32 = 0.4;
+/// Shortest time that pixels take to settle where a stream begins: simulated ones of a bandwidth of 50 Hz take as long.
+const SETTLING_US: f32 = 10_000.0;
+/// The window is so many times as long at least, or all of it is believed.
+const LEAST_SETTLED: f32 = 4.0;
+/// What they tell meanwhile is not believed where the speed without it is as exact, but for this factor; or differs by so many of its
+/// standard errors, from a moving camera by so many.
+const AS_EXACT: f32 = 1.25;
+const UNSETTLED_SIGMAS: f32 = 2.0;
+const MOVING_SIGMAS: f32 = 3.0;
 
 /// The turn followed through the window.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -33,6 +43,8 @@ pub struct Slope {
     pub alpha_sigma_rad_s2: f32,
     /// Root mean square speed of the axis in px/s: 0 on a tripod, tens in the hand.
     pub drift_px_s: f32,
+    /// Time at the window's start that was not believed, in microseconds.
+    pub unsettled_us: f32,
 }
 
 /// Whether the turn goes by `most_rad` beyond an even one from a block in step to the next.
@@ -45,18 +57,48 @@ fn slips(points: &[Point], most_rad: f32) -> bool {
 }
 
 impl Pose {
+    /// Time that pixels take to tell edges rightly where the stream begins with the window: until each has seen one, and a slow one
+    /// has got used to the light.
+    pub(super) fn unsettled_us(&self, window: &Window<'_>) -> f32 {
+        let unsettled_us = larger(self.period_us / self.sectors as f32, SETTLING_US);
+        let small = LEAST_SETTLED * unsettled_us <= self.window_us;
+        if window.is_first() && small { unsettled_us } else { 0.0 }
+    }
+
     /// The trend of the turn through the blocks, and how the axis wanders; `None` when too few blocks tell, or the path
     /// has slipped.
+    ///
+    /// What pixels tell before they have settled is believed where the rest bears it out and it tells more.
     pub(super) fn trend(&self, sums: &Sums) -> Option<Slope> {
+        let all = self.trend_after(0.0, sums)?;
+        if self.unsettled_us <= 0.0 {
+            return Some(all);
+        }
+        let Some(settled) = self.trend_after(self.unsettled_us, sums) else { return Some(all) };
+        let off_rad_s = (all.speed.omega_rad_s - settled.speed.omega_rad_s).abs();
+        let sigma_rad_s = settled.speed.sigma_rad_s;
+        // A hand did something meanwhile.
+        let moves = all.drift_px_s > MOVING_PX_S;
+        let as_exact = !moves && sigma_rad_s < AS_EXACT * all.speed.sigma_rad_s;
+        let sigmas = if moves { MOVING_SIGMAS } else { UNSETTLED_SIGMAS };
+        Some(if as_exact || off_rad_s > sigmas * sigma_rad_s { settled } else { all })
+    }
+
+    /// The trend of what came later than so long after the window's start, as if all before went on as it did.
+    // Not inlined: it is called twice.
+    #[inline(never)]
+    fn trend_after(&self, unsettled_us: f32, sums: &Sums) -> Option<Slope> {
         let count = self.path.blocks();
         let periods = count / self.in_period.max(1);
-        let half_us = 0.5 * self.window_us;
+        let middle_us = 0.5 * unsettled_us;
+        let half_us = 0.5 * self.window_us - middle_us;
         let mut points = Vec::<Point, MAX_KNOTS>::new();
         for block in sums.blocks.iter().take(count) {
             let t_us = block.middle_us();
             let (off_rad, weight) = block.turn_rad(self.harmonic as f32).unwrap_or_default();
             let y = self.path.at(t_us).turn_rad + off_rad;
-            points.push(Point { u: t_us / half_us, y, weight }).ok();
+            let u = (t_us - middle_us) / half_us;
+            points.push(Point { u, y, weight: if u < -1.0 { 0.0 } else { weight } }).ok();
         }
         if slips(&points, SLIP_CYCLES * TAU / self.harmonic as f32) {
             return None;
@@ -69,17 +111,26 @@ impl Pose {
             .filter_map(|fold| Trend::fit(&points, fold))
             .min_by(|a, b| a.slope_error.total_cmp(&b.slope_error))?;
         let factor = student_over_normal(trend.degrees_of_freedom);
-        let half_s = half_us * 1e-6;
+        let (half_s, middle_s) = (half_us * 1e-6, middle_us * 1e-6);
+        let alpha_rad_s2 = trend.bend / (half_s * half_s);
+        let alpha_sigma_rad_s2 = factor * trend.bend_error / (half_s * half_s);
+        let swing_rad_s = |bent: f32| 0.5 * TAU / half_s * sqrt(bent.max(0.0));
+        let beyond_rad_s = trend.slope / half_s - alpha_rad_s2 * middle_s;
+        // What is left out may have had another acceleration, and a swing.
+        let error = factor * trend.slope_error / half_s;
+        let accelerated = alpha_sigma_rad_s2 * middle_s;
+        let swung = swing_rad_s(trend.bent_beside_bend()) * middle_us / half_us;
         Some(Slope {
             speed: Estimate {
-                omega_rad_s: self.omega_rad_s + trend.slope / half_s,
-                sigma_rad_s: factor * trend.slope_error / half_s,
+                omega_rad_s: self.omega_rad_s + beyond_rad_s,
+                sigma_rad_s: sqrt(error * error + accelerated * accelerated + swung * swung),
             },
-            beyond_rad_s: trend.slope / half_s,
-            swing_rad_s: 0.5 * TAU / half_s * sqrt(trend.bent),
-            alpha_rad_s2: trend.bend / (half_s * half_s),
-            alpha_sigma_rad_s2: factor * trend.bend_error / (half_s * half_s),
+            beyond_rad_s,
+            swing_rad_s: swing_rad_s(trend.bent),
+            alpha_rad_s2,
+            alpha_sigma_rad_s2,
             drift_px_s: self.drift_px_s(),
+            unsettled_us,
         })
     }
 
