@@ -10,7 +10,7 @@ use heapless::Vec;
 use super::angular::AngularSums;
 use super::polar::PolarEvent;
 use crate::limits::MAX_BLADES;
-use crate::math::{Turn, TurnRate};
+use crate::math::{Turn, TurnRate, sqrt};
 use crate::rotors::Disc;
 
 /// Angular harmonics: the third overtone of eight blades.
@@ -85,13 +85,16 @@ pub fn symmetry(angular: &AngularSums) -> Symmetry {
     }
     let best = scores.iter().copied().fold(0.0, f32::max);
     let events: u32 = angular.counts.iter().take(2 * RINGS).sum();
-    if best * best * (events.min(MOST_CHANCE) as f32) < LEAST_SCORE * LEAST_SCORE {
-        return Symmetry { parts: Some(1), score: best };
-    }
+    let least = LEAST_SCORE / sqrt(events.min(MOST_CHANCE) as f32);
     let parts = (2..=MOST_PARTS).rev().find(|n| scores[*n] >= CLOSE_TO_BEST * best).unwrap_or(1);
     let mean_peak =
         (1..parts).map(|i| at(i as f32 / parts as f32)).sum::<f32>() / (parts - 1).max(1) as f32;
     let known = parts <= usize::from(MAX_BLADES);
+    // The edges of a sharp single mark differ from what is beside them at some angles, but nothing comes again there.
+    let comes_again = mean_peak >= least * zero || !known;
+    if best < least || !comes_again {
+        return Symmetry { parts: Some(1), score: best };
+    }
     Symmetry { parts: known.then_some(parts as u8), score: mean_peak / zero }
 }
 
@@ -104,4 +107,34 @@ fn powers(angular: &AngularSums) -> [f32; HARMONICS] {
         }
     }
     powers
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Events at the edges of so many parts, ON at one edge and OFF at the other, both as sharp as can be.
+    fn edges(parts: u32, width_rad: f32) -> AngularSums {
+        let mut angular = AngularSums::EMPTY;
+        for part in 0..parts {
+            let first_rad = part as f32 * crate::math::TAU / parts as f32;
+            for (bank, at_rad) in [first_rad, first_rad + width_rad].into_iter().enumerate() {
+                angular.counts[bank] += 2_000;
+                for (k, sum) in angular.sums[bank][..HARMONICS].iter_mut().enumerate() {
+                    let (sin, cos) = Turn::from_rad(at_rad).times(k as u32 + 1).sin_cos();
+                    sum.0 += 2_000.0 * cos;
+                    sum.1 += 2_000.0 * sin;
+                }
+            }
+        }
+        angular
+    }
+
+    #[test]
+    fn sharp_parts_are_counted_and_a_sharp_single_mark_is_one() {
+        for parts in 1..=u32::from(MAX_BLADES) {
+            let found = symmetry(&edges(parts, 0.36));
+            assert_eq!(found.parts.map(u32::from), Some(parts), "{found:?}");
+        }
+    }
 }

@@ -83,6 +83,8 @@ impl Measurement {
     }
 
     /// Plans the refinement.
+    // Not inlined: flash is short.
+    #[inline(never)]
     pub(super) fn plan_refinement(&mut self, window: &Window<'_>) {
         self.plan(window, REFINEMENT_PERIODS, self.worth(REFINEMENT, REFINEMENT_EVENTS));
         self.stage = Stage::Refinement;

@@ -238,6 +238,8 @@ impl Measurement {
     }
 
     /// Whether so many events keep step as do at this speed, which was asked before, and no more is to be seen.
+    // Not inlined: flash is short.
+    #[inline(never)]
     fn too_fast_for_edges(&self) -> bool {
         self.scatter_rad() > NO_EDGE_RAD && !self.doubted()
     }
