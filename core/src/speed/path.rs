@@ -130,7 +130,7 @@ impl<'p> Moving<'p> {
     /// Position relative to the axis, and its squared length, when the event lies in the disc's annulus.
     #[must_use]
     pub fn place(&self, event: StoredEvent) -> Option<(f32, f32, f32)> {
-        let knot = self.path.at(self.since_middle_us(event) as f32);
+        let knot = self.path.between(self.path.place(self.since_middle_us(event) as f32));
         self.place_by(event, knot)
     }
 
