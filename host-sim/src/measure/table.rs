@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use evtach_core::{Reading, RotorReading, Speed, Status};
+use evtach_core::{Frame, Reading, RotorReading, Speed, Status};
 
 use super::json::{FileFacts, letter};
 use super::summary::Summary;
@@ -44,8 +44,12 @@ fn row(rotor: &RotorReading) -> String {
         Some(n) => format!("{n} blades"),
         None => "blades unknown".to_owned(),
     };
+    let frame = match speed.frame {
+        Frame::Camera => "",
+        Frame::Room => " in the room",
+    };
     let mut line = format!(
-        "{}  {} rpm {}  {blades}  {}  {place}",
+        "{}  {} rpm {}{frame}  {blades}  {}  {place}",
         letter(rotor.id),
         with_error(speed),
         speed.direction().as_str(),

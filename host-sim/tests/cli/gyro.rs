@@ -73,6 +73,7 @@ fn a_report_takes_the_gyro_as_a_measurement_does() {
         let table = evtach(&[&["measure", &file], options].concat(), b"").stdout;
         let rotor = table.lines().nth(1).expect("a line for the rotor");
         assert!(rotor.contains(" rpm cw") && page.contains(rotor), "{rotor}");
+        assert_eq!(rotor.contains(" rpm cw in the room "), frame == "room", "{rotor}");
     }
 }
 
