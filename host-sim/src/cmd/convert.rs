@@ -10,6 +10,7 @@ use evtach_host::recording::{self, ImuSample, OpenOptions};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::how::parse_roi;
+use super::wait::LONGEST_US;
 
 /// Arguments of `evtach convert`.
 #[derive(clap::Args)]
@@ -161,7 +162,11 @@ impl Picker {
             let (first_us, shift_us) = self.origin(event.t_us);
             let since_us = event.t_us.saturating_sub(first_us);
             if since_us > self.end_us {
-                wanted = false;
+                // Recorders write inertial samples behind the events of their time.
+                wanted = since_us - self.end_us <= LONGEST_US;
+                if wanted {
+                    continue;
+                }
                 break;
             }
             let inside = self.roi.is_none_or(|roi| roi.contains(event.x, event.y));

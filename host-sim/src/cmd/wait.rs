@@ -3,7 +3,7 @@
 use evtach_core::{Event, GyroSample};
 
 /// Longest that they wait: recorders write samples some ten milliseconds behind the events of their time.
-const LONGEST_US: u64 = 100_000;
+pub const LONGEST_US: u64 = 100_000;
 
 /// Holds events back until a sample of their time has come, so that no window is measured before the camera's roll in it is known.
 #[derive(Default)]

@@ -1,5 +1,6 @@
 //! The mean speed of a rotor over a recording, from readings whose windows overlap and leave gaps.
 
+use std::f64::consts::PI;
 use std::ops::Range;
 
 use evtach_core::{Frame, Reading, Speed};
@@ -45,13 +46,15 @@ impl Piece {
         f64::from(self.speed.omega_sigma_rad_s).powi(2)
     }
 
-    /// Variance of the speed within the window.
-    fn swing_variance(&self) -> f64 {
+    /// Variance of the speed within the window, beside that of a steady acceleration.
+    fn swing_variance(&self, slope_rad_s2: f64) -> f64 {
+        // A ramp's, taken for one swing of that bend.
+        let by_ramp = PI / 45_f64.sqrt() * slope_rad_s2 * 0.5e-6 * self.length_us() as f64;
         let by_hand = match self.speed.frame {
             Frame::Camera => 0.0,
             Frame::Room => HAND_ROLL_RAD_S,
         };
-        (self.swing_rad_s.powi(2) - by_hand.powi(2)).max(0.0)
+        (self.swing_rad_s.powi(2) - by_hand.powi(2) - by_ramp.powi(2)).max(0.0)
     }
 
     /// Finite also for a sigma of zero.
@@ -114,7 +117,8 @@ pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) 
     let line = Line::through(pieces, span_us.start);
     let off = |piece: &Piece| piece.omega_rad_s() - line.at(piece.middle_us());
     let scatter = weighted_mean(pieces, |p| off(p).powi(2));
-    let swing = weighted_mean(pieces, Piece::swing_variance);
+    let slope_rad_s2 = line.slope_rad_s2.unwrap_or(0.0);
+    let swing = weighted_mean(pieces, |p| p.swing_variance(slope_rad_s2));
 
     let clock = (f64::from(clock_sigma_ppm) * 1e-6 * line.mean_rad_s).powi(2);
     let (mut whole_s, mut turn_rad, mut turn_variance, mut by_gyro) = (0.0, 0.0, 0.0, 0.0);
@@ -272,6 +276,12 @@ mod tests {
         let turn_rad = |t: f64| 230.0 * t + 5.0 * t * t;
         let (mean_rad_s, _) = mean(turn_rad, 640);
         assert!((mean_rad_s - turn_rad(0.64) / 0.64).abs() < 1e-3, "{mean_rad_s}");
+        // Nor is it a swing, which a bend of 10 rad/s^2 in windows of 150 ms would be taken for.
+        let (_, sigma_rad_s) = mean(turn_rad, 640);
+        let (_, bent_rad_s) = swinging_mean(turn_rad, 640, PI / 45_f64.sqrt() * 10.0 * 0.075);
+        let (_, swung_rad_s) = swinging_mean(turn_rad, 640, 1.0);
+        assert!((bent_rad_s / sigma_rad_s - 1.0).abs() < 0.01, "{bent_rad_s} {sigma_rad_s}");
+        assert!(swung_rad_s > 2.0 * sigma_rad_s, "{swung_rad_s} {sigma_rad_s}");
     }
 
     #[test]

@@ -1,5 +1,8 @@
 //! The camera's roll, from `evtach synth` by way of a file to the speed in the room.
 
+use evtach_core::{Event, Geometry, GyroSample, Polarity};
+use evtach_host::recording::write::{self, WriteFormat};
+use evtach_host::recording::{self, ImuSample, OpenOptions};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -55,6 +58,34 @@ fn the_gyro_in_a_recording_gives_the_speed_in_the_room() {
             assert!(off.abs() < 4.0 * sigma, "off by {off:+.3} ± {sigma:.3} rpm");
         }
     }
+}
+
+/// As recorders write them, samples stand behind the events of their time.
+#[test]
+fn a_part_keeps_the_samples_that_stand_behind_its_events() {
+    let folder = folder();
+    let [whole, part] = ["whole.aedat4", "part.aedat4"].map(|name| folder.path().join(name));
+    let geometry = Geometry::new(64, 48).expect("a sensor in range");
+    let mut writer = write::create(&whole, WriteFormat::Aedat4, geometry).expect("a file");
+    for ms in 0..300_u64 {
+        let event = |us| Event { t_us: 1_000 * ms + us, x: 5, y: 7, polarity: Polarity::On };
+        writer.write(&(0..1_000).map(event).collect::<Vec<_>>()).expect("events that fit");
+        let behind = ms.checked_sub(30).map(|ms| GyroSample { t_us: 1_000 * ms, roll_rad_s: 0.1 });
+        let samples: Vec<ImuSample> = behind.iter().map(ImuSample::rolling).collect();
+        writer.write_imu(&samples).expect("samples that fit");
+    }
+    writer.finish().expect("room on the disk");
+    let [from, to] = [&whole, &part].map(|path| path.display().to_string());
+    let run = evtach(&["convert", &from, &to, "--end", "0.2"], b"");
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+
+    let mut recording = recording::open(&part, &OpenOptions::default()).expect("what was written");
+    let (mut events, mut samples) = (Vec::new(), Vec::new());
+    while recording.read_chunk(&mut events).expect("no damage") {
+        samples.append(&mut recording.take_imu());
+    }
+    samples.append(&mut recording.take_imu());
+    assert_eq!((events.len(), samples.len()), (200_001, 201));
 }
 
 #[test]
