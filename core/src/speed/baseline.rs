@@ -79,7 +79,7 @@ pub struct Pairs {
     folds: u32,
     /// Whether the next pair is being registered.
     registering: bool,
-    /// Mean rate of the path's turn over the window in rad/s; `None`: yaws are taken as they are.
+    /// Mean rate of the path's turn over the window, as the phase tells it, in rad/s; `None`: yaws are taken as they are.
     even_rad_s: Option<f32>,
     /// Time at the window's start that no pair is cut from, where there is room.
     unsettled_us: f32,
@@ -157,9 +157,14 @@ impl Pairs {
         self.even_rad_s = Some(even_rad_s);
     }
 
-    /// Cuts no pair from so long a time at the window's start, where there is room.
-    pub const fn settle(&mut self, unsettled_us: f32) {
-        self.unsettled_us = unsettled_us;
+    /// Cuts no pair from so long a time at the window's start, where there is room for two that share no slice.
+    pub fn settle(&mut self, unsettled_us: f32, window_us: f32) {
+        let span = self.folds as f32 - 1.0 + SLICE_PERIODS;
+        let room = (window_us - unsettled_us) / self.pace.period_us() - self.periods - span;
+        if room >= span {
+            self.unsettled_us = unsettled_us;
+            self.independent = (1.0 + room / span).min(self.effort.pairs as f32);
+        }
     }
 
     /// Baseline and span of a slice, in microseconds, and when the next pair starts.
@@ -169,9 +174,9 @@ impl Pairs {
         let period_us = self.pace.period_us();
         let baseline_us = self.periods * period_us;
         let span_us = (self.folds as f32 - 1.0 + SLICE_PERIODS) * period_us;
-        let all_us = (window.duration_us as f32 - baseline_us - span_us).max(0.0);
-        let room_us = (all_us - self.unsettled_us).max(0.0);
-        (baseline_us, span_us, all_us - room_us + self.apart_us(room_us) * self.next as f32)
+        let settled_us = window.duration_us as f32 - self.unsettled_us;
+        let room_us = (settled_us - baseline_us - span_us).max(0.0);
+        (baseline_us, span_us, self.unsettled_us + self.apart_us(room_us) * self.next as f32)
     }
 
     /// By how much the pair turns beyond the window's mean speed, along the path.
@@ -281,6 +286,18 @@ mod tests {
         // Where the window holds no later one, the pairs fill it.
         let short_us = 0.5 * baseline_us;
         assert!((39.0 * pairs.apart_us(short_us) - short_us).abs() < 1.0);
+    }
+
+    #[test]
+    fn pairs_lie_behind_what_has_not_settled_and_fewer_are_independent() {
+        let (mut behind, mut nowhere) = (pairs(), pairs());
+        let (before, period_us) = (behind.independent, behind.pace.period_us());
+        let window_us = 10.0 * period_us;
+        behind.settle(8.0 * period_us, window_us);
+        // Slices of a quarter of a period, 0.4 apart, begin within 1.35 periods.
+        assert!(before > 30.0 && (behind.independent - 6.4).abs() < 0.01, "{behind:?}");
+        nowhere.settle(9.3 * period_us, window_us);
+        assert!(nowhere.unsettled_us == 0.0 && nowhere.independent == before, "{nowhere:?}");
     }
 
     #[test]

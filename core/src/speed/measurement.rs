@@ -247,7 +247,7 @@ impl Measurement {
     }
 
     /// Whether the axis moves in the picture, as far as was seen.
-    pub(super) fn moves(&self) -> bool {
+    fn moves(&self) -> bool {
         self.drift_px_s > MOVING_PX_S
     }
 
@@ -313,7 +313,8 @@ impl Measurement {
         });
         let knot = self.pose.path().at(0.0);
         let (x_px, y_px) = (self.disc.x_px + knot.x_px, self.disc.y_px + knot.y_px);
-        let nothing = self.faint && self.status == Status::Refused(Reason::Ambiguous);
+        let guessed = matches!(self.status, Status::Refused(Reason::Ambiguous | Reason::TooSlow));
+        let nothing = self.faint && guessed;
         Outcome {
             status: if nothing { Status::Refused(Reason::NoRotation) } else { self.status },
             found: Found {

@@ -62,18 +62,18 @@ impl Measurement {
 
     /// Plans pairs of the lock, behind what is not believed. Where the speed swings, or they lie so, their yaws are made those of the
     /// window's mean speed wherever in the window they lie. By less than witnesses may differ it does not matter, and a path that went
-    /// astray, as in a hand, would bear itself out.
+    /// astray, as in a hand, would bear itself out: there they lie all over the window, and a steady acceleration cancels.
     // Not inlined: it is called in three places.
     #[inline(never)]
     fn plan_lock_pairs(&mut self, window: &Window<'_>, periods: f32, effort: Effort) {
         self.plan(window, periods, effort);
         let least_rad_s = LOCK_AGREEMENT * self.omega_rad_s.abs();
         let moves = self.moves();
-        if let (Some(pairs), Some(slope)) = (&mut self.pairs, self.pose.slope()) {
-            pairs.settle(slope.unsettled_us);
-            if !moves && (slope.swing_rad_s > least_rad_s || slope.unsettled_us > 0.0) {
-                pairs.along(slope.beyond_rad_s);
-            }
+        if let (Some(pairs), Some(slope), false) = (&mut self.pairs, self.pose.slope(), moves)
+            && (slope.swing_rad_s > least_rad_s || slope.unsettled_us > 0.0)
+        {
+            pairs.settle(slope.unsettled_us, window.duration_us as f32);
+            pairs.along(slope.beyond_rad_s);
         }
     }
 

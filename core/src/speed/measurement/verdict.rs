@@ -143,6 +143,9 @@ impl Measurement {
         // What a hand makes of a steady speed is no acceleration.
         let by_hand = ACCELERATION_SIGMAS * ROLL_APART * roll / window_s;
         self.alpha_rad_s2 = self.alpha_rad_s2.filter(|alpha| alpha.abs() > by_hand);
+        if roll > 0.0 && lock.is_some() {
+            self.widen_astray();
+        }
         match self.status {
             Status::Coarse => self.widen_coarse(window, held_up / QUEUE_SIGMA, roll),
             Status::Locked if self.pose.in_period() < MARK_BLOCKS => self.widen_mark(SHAKE_PX),
@@ -152,9 +155,8 @@ impl Measurement {
             _ => {}
         }
         let own = self.estimate.sigma_rad_s;
-        let astray = if roll > 0.0 { self.astray_rad_s() } else { 0.0 };
         let late = held_up * self.estimate.omega_rad_s;
-        self.estimate.sigma_rad_s = sqrt(own * own + astray * astray + late * late + clock * clock);
+        self.estimate.sigma_rad_s = sqrt(own * own + late * late + clock * clock);
         self.roll_sigma_rad_s = roll;
     }
 
@@ -170,13 +172,21 @@ impl Measurement {
         })
     }
 
-    /// Half of what the witnesses of the lock are apart where that is more than their own scatter explains: the truth may be with either.
-    fn astray_rad_s(&self) -> f32 {
+    /// Adds half of what the witnesses of the lock are apart where that is more than their own scatter explains: the truth may be with
+    /// either.
+    fn widen_astray(&mut self) {
         let Evidence { lock_rad_s, lock_sigma_rad_s, phase_rad_s, phase_sigma_rad_s, .. } =
             self.evidence;
         let apart_rad_s = lock_rad_s.zip(phase_rad_s).map_or(0.0, |(a, b)| (a - b).abs());
         let scatter = lock_sigma_rad_s.zip(phase_sigma_rad_s).map_or(0.0, |(a, b)| a * a + b * b);
-        if apart_rad_s > ASTRAY_SIGMAS * sqrt(scatter) { 0.5 * apart_rad_s } else { 0.0 }
+        if apart_rad_s > ASTRAY_SIGMAS * sqrt(scatter) {
+            let Estimate { omega_rad_s, sigma_rad_s: own } = self.estimate;
+            self.estimate.sigma_rad_s = sqrt(own * own + 0.25 * apart_rad_s * apart_rad_s);
+            let sharp = self.estimate.sigma_rad_s < MOST_LOCK_SIGMA * omega_rad_s.abs();
+            if self.status == Status::Locked && !sharp {
+                self.status = Status::Coarse;
+            }
+        }
     }
 
     /// Whether the refinement, which knows nothing of harmonics, saw another speed: about a wrong centre a neighbour of the right
@@ -252,6 +262,8 @@ impl Measurement {
     }
 
     /// How sharp the edges are. A single mark is told from its axis's shaking by its sharpness alone, so noise counts against it.
+    // Not inlined: flash is short.
+    #[inline(never)]
     fn edges_px(&self) -> f32 {
         if self.parts == Some(1) { self.pose.sharpness_px() } else { self.pose.blur_px() }
     }
@@ -273,6 +285,8 @@ impl Measurement {
 
     /// The reading of a single mark is as good as its axis holds still: what the mark does and what the camera does look alike, where it
     /// is not followed around the turn, or a hand sways as fast as it turns.
+    // Not inlined: it is called in three places.
+    #[inline(never)]
     fn widen_mark(&mut self, shake_px: f32) {
         if self.parts == Some(1) || self.parts == Some(2) && !self.alike {
             let turn_rad = self.evidence.periods.unwrap_or(0.0) * TAU;

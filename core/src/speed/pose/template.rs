@@ -30,6 +30,8 @@ impl Template {
     }
 
     /// Share of so many events in step, 0 to 1, corrected for what chance gives.
+    // Not inlined: it is called in three places.
+    #[inline(never)]
     pub fn coherence(&self, counts: &Counts) -> f32 {
         let (mut in_step, mut total) = (0.0, 0.0);
         for (sum, count) in self.sums.iter().zip(counts) {
