@@ -87,6 +87,8 @@ pub struct Tachometer<'m> {
     in_step_hz: Option<f32>,
     /// Whether a rotor that is followed was not locked in this window.
     lost: bool,
+    /// Whether polarity is ignored in what is searched and found, as the window showed nothing sure with it.
+    ignores_polarity: bool,
     tracker: Tracker,
     /// Readings until the whole image is searched again, or [`rhythm::NEVER`].
     until_search: u8,
@@ -140,6 +142,7 @@ impl<'m> Tachometer<'m> {
             outcomes: Vec::new(),
             in_step_hz: None,
             lost: false,
+            ignores_polarity: false,
             tracker: Tracker::default(),
             until_search: 0,
             round: Round::default(),

@@ -3,7 +3,7 @@
 use heapless::Vec;
 
 use crate::limits::MAX_ROTORS;
-use crate::reading::Status;
+use crate::reading::{Reason, Status};
 use crate::rotors::{Disc, Found};
 use crate::speed::measurement::Outcome;
 
@@ -32,6 +32,12 @@ impl Known {
     #[must_use]
     pub const fn is_seen(&self) -> bool {
         self.missed == 0
+    }
+
+    /// Whether the last reading saw it and could not tell its speed.
+    #[must_use]
+    pub fn is_ambiguous(&self) -> bool {
+        self.is_seen() && self.status == Status::Refused(Reason::Ambiguous)
     }
 
     /// Whether the last reading locked it, so that it can be followed: what was only suspected is not.

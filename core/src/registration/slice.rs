@@ -57,7 +57,7 @@ impl Cut {
                 let Some((x_px, y_px, _)) = disc.place(event) else { continue };
                 if index * self.most >= next {
                     let tau_s = (event.since(window.start_us) as f32 - start_us) * 1e-6;
-                    slice.push(SlicePoint { x_px, y_px, tau_s, on: event.is_on() }).ok();
+                    slice.push(SlicePoint { x_px, y_px, tau_s, on: window.is_on(event) }).ok();
                     next += total.max(self.most);
                 }
                 index += 1;

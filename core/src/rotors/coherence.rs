@@ -128,7 +128,7 @@ impl Coherence {
         let inside = |event: StoredEvent| grid.index(event.x(), event.y());
         even.step(window, usize::MAX, inside, |event, index| {
             let (sin, cos) = rate.after(event.since(window.start_us) - mid_us).sin_cos();
-            let bank = usize::from(event.is_on());
+            let bank = usize::from(window.is_on(event));
             if let Some(sum) = self.sums[bank].get_mut(index) {
                 sum.0 += cos;
                 sum.1 -= sin;

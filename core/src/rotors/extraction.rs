@@ -58,6 +58,8 @@ pub struct Found {
     pub cover: f32,
     /// Events in step that it explains.
     pub explained: f32,
+    /// Whether it was found, and is measured, without regard to polarity.
+    pub ignores_polarity: bool,
     /// How it is tilted, once that was asked.
     pub tilt: Option<Tilt>,
     /// Root mean square speed of its axis in px/s, once it was followed: 0 on a tripod, tens in the hand.
@@ -205,6 +207,8 @@ pub struct View<'a> {
 
 impl Extraction {
     /// Searches outside this rotor only.
+    // Not inlined: it is called in several places.
+    #[inline(never)]
     pub fn leave_out(&mut self, known: Disc) {
         self.taken.push(covered(known)).ok();
     }

@@ -147,9 +147,9 @@ impl Visits {
             if *counted {
                 let tick = tick(event.since(start_us), self.window_us);
                 if let Some(time) = times.get_mut(usize::from(*place)) {
-                    *time = (tick << 1) | u16::from(event.is_on());
+                    *time = (tick << 1) | u16::from(window.is_on(event));
                 }
-            } else if event.is_on()
+            } else if window.is_on(event)
                 && let Some(on) = times.get_mut(cell)
             {
                 *on += 1;

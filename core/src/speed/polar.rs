@@ -97,9 +97,9 @@ impl PolarEvent {
     }
 
     /// Converts one event; `mid_us` is the middle of the window since its start.
-    fn new(event: StoredEvent, place: (f32, f32, f32), start_us: u64, mid_us: i32) -> Self {
-        let polarity = if event.is_on() { 0x8000 } else { 0 };
-        Self::at(place, polarity, event.since(start_us) - mid_us)
+    fn new(event: StoredEvent, place: (f32, f32, f32), window: &Window<'_>, mid_us: i32) -> Self {
+        let polarity = if window.is_on(event) { 0x8000 } else { 0 };
+        Self::at(place, polarity, event.since(window.start_us) - mid_us)
     }
 }
 
@@ -121,7 +121,7 @@ pub fn track(window: &Window<'_>, disc: Disc, track: &mut PolarTrack, tracking: 
         track.capacity(),
         |event| annulus.place(event),
         |event, place| {
-            track.push(PolarEvent::new(event, place, window.start_us, mid_us)).ok();
+            track.push(PolarEvent::new(event, place, window, mid_us)).ok();
         },
     )
 }

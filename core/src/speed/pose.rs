@@ -122,8 +122,8 @@ pub struct Pose {
     /// beside them hold few events.
     even_share: f32,
     started: bool,
-    /// Time from the window's start on that a pixel may take to its first events of the stream, where that is a small part of the
-    /// window: 0 in all later windows.
+    /// Time from the window's start on that a pixel may take to its first events of the stream, and a slow one to get used to the light,
+    /// where that is a small part of the window: 0 but where the stream, or what is left of it, begins with the window.
     unsettled_us: f32,
     schedule: Schedule,
     /// Segment of the window that is looked at next.
@@ -285,7 +285,7 @@ impl Pose {
             let annulus = Annulus::of(self.disc);
             if even.weigh(window, |event| annulus.place(event).is_some()) {
                 self.started = true;
-                self.unsettled_us = self.unsettled_us(window);
+                self.unsettled_us = self.settling_us(window);
                 self.events = even.count();
                 self.even_share = even.share();
                 *even = Even::EMPTY;
@@ -441,6 +441,7 @@ impl Pose {
         let doubles = self.may_double();
         // A sample of the events tells the tilt well enough.
         let tilts = self.tilt.is_some() && self.schedule.samples();
+        let always_on = usize::from(window.ignores_polarity);
         let mut seen = Vec::new();
         for event in window.segment(self.segment).iter().step_by(stride) {
             if !event.is_of(one_of as u32) {
@@ -456,7 +457,8 @@ impl Pose {
             let (s, c) = angle.times(self.harmonic).sin_cos();
             let ring = ((quick_sqrt(r2) * rings_per_px) as usize).min(rings - 1);
             let sector = angle.sector(self.sectors) as usize;
-            let bank = (2 * (sector * rings + ring) + usize::from(event.is_on())).min(BANKS - 1);
+            let bank = (2 * (sector * rings + ring) + (usize::from(event.is_on()) | always_on))
+                .min(BANKS - 1);
             sums.counts[bank] += 1;
             sums.low.add(bank, (s, c));
             if doubles {

@@ -24,7 +24,8 @@ impl Store<'_> {
         };
         let duration_us = (segment_us * segments as u32)
             .min(end_us.saturating_sub(start_us).min(u64::from(u32::MAX)) as u32);
-        Window { parts, start_us, duration_us, segments, first: start_us == self.began_us }
+        let first = start_us == self.began_us;
+        Window { parts, start_us, duration_us, segments, first, ignores_polarity: false }
     }
 
     /// Events counted, kept and lost in the oldest `segments` segments.
@@ -75,6 +76,8 @@ pub struct Window<'a> {
     pub duration_us: u32,
     segments: usize,
     first: bool,
+    /// Whether all events count as ON.
+    pub ignores_polarity: bool,
 }
 
 impl<'a> Window<'a> {
@@ -88,6 +91,13 @@ impl<'a> Window<'a> {
     #[must_use]
     pub const fn is_first(&self) -> bool {
         self.first
+    }
+
+    /// Whether one of its events counts as ON.
+    #[inline]
+    #[must_use]
+    pub const fn is_on(&self, event: StoredEvent) -> bool {
+        event.is_on() | self.ignores_polarity
     }
 
     /// Number of stored events.

@@ -48,7 +48,7 @@ impl Tachometer<'_> {
         let mut rotors = Vec::<RotorReading, MAX_ROTORS>::new();
         for outcome in &self.outcomes {
             let id = self.tracker.identify(outcome);
-            rotors.push(rotor_reading(id, outcome, roll)).ok();
+            rotors.push(rotor_reading(id, outcome, self.settings.blades, roll)).ok();
         }
         sort_few(&mut rotors, |a, b| a.id < b.id);
         let lost =
@@ -161,8 +161,13 @@ impl Tachometer<'_> {
     }
 }
 
-/// What is told of a rotor; `roll` is the camera's roll by its gyro and the standard deviation of that, in rad/s.
-fn rotor_reading(id: u8, outcome: &Outcome, roll: Option<(f32, f32)>) -> RotorReading {
+/// What is told of a rotor; `stated` is its blade count as the person knows it, `roll` is the camera's roll by its gyro and the standard deviation of that, in rad/s.
+fn rotor_reading(
+    id: u8,
+    outcome: &Outcome,
+    stated: Option<u8>,
+    roll: Option<(f32, f32)>,
+) -> RotorReading {
     let mut speed = outcome.speed;
     if let Some(speed) = &mut speed {
         // The gyro serves where its offset is known better than what the hand may have rolled.
@@ -177,7 +182,9 @@ fn rotor_reading(id: u8, outcome: &Outcome, roll: Option<(f32, f32)>) -> RotorRe
     }
     let Disc { x_px, y_px, radius_px } = outcome.found.disc;
     let evidence: Evidence = outcome.evidence;
-    let (blades, status) = (outcome.parts, outcome.status);
+    let status = outcome.status;
+    // Without polarity leading and trailing edges look alike: they may be twice as many.
+    let blades = if outcome.found.ignores_polarity { stated } else { outcome.parts };
     RotorReading { id, x_px, y_px, radius_px, blades, status, speed, evidence }
 }
 

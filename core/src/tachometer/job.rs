@@ -21,6 +21,7 @@ impl Tachometer<'_> {
         self.outcomes.clear();
         self.in_step_hz = None;
         self.lost = false;
+        self.ignores_polarity = false;
         let known = self.tracker.known().iter().filter(|known| known.can_be_followed());
         for known in known {
             let followed = Some((known.parts, known.alike));
@@ -58,6 +59,8 @@ impl Tachometer<'_> {
     }
 
     /// Searches the image outside of what was measured in this window.
+    // Not inlined: it is called in two places.
+    #[inline(never)]
     fn search_anew(&mut self) {
         self.until_search = self.rhythm.search_every;
         self.candidates.clear();
@@ -95,7 +98,7 @@ impl Tachometer<'_> {
 
     /// One step of the running job; `true` once the window has been measured.
     fn step(&mut self) -> bool {
-        let window = self.store.window(self.window_segments, self.window_end_us);
+        let mut window = self.store.window(self.window_segments, self.window_end_us);
         match &mut self.job {
             Job::Idle => true,
             Job::Search(extraction) => {
@@ -106,12 +109,15 @@ impl Tachometer<'_> {
                     Some(more) => (&mut *more.times, &mut *more.track),
                     None => (times.as_mut_slice(), self.polar.as_mut_view()),
                 };
+                window.ignores_polarity = self.ignores_polarity;
                 let mut view = View { window, grid, weights, times };
                 if extraction.step(&mut view, polar, self.spectrum, scratch) {
                     self.in_step_hz = extraction.in_step_hz();
                     self.round = extraction.round();
                     for candidate in extraction.candidates() {
-                        suspect(&mut self.candidates, *candidate);
+                        let ignores_polarity = self.ignores_polarity;
+                        let found = Found { ignores_polarity, ..*candidate };
+                        suspect(&mut self.candidates, found);
                     }
                     // What a search missed this time comes last, where nothing else was measured in its place.
                     for found in self.tracker.known().iter().filter_map(Known::afresh) {
@@ -131,12 +137,14 @@ impl Tachometer<'_> {
                     Some(more) => &mut *more.track,
                     None => self.polar.as_mut_view(),
                 };
+                let Some(candidate) = self.candidates.get(*index) else { return true };
+                window.ignores_polarity = candidate.found.ignores_polarity;
                 if !measurement.step(&window, &stated, polar, bench) {
                     return false;
                 }
-                let (index, outcome) = (*index, measurement.result());
-                let followed = self.candidates.get(index).is_some_and(|c| c.followed.is_some());
-                if followed && outcome.status != Status::Locked {
+                let (index, mut outcome) = (*index, measurement.result());
+                outcome.found.ignores_polarity = window.ignores_polarity;
+                if candidate.followed.is_some() && outcome.status != Status::Locked {
                     // The others are followed all the same.
                     self.lost = true;
                 } else {
@@ -150,7 +158,9 @@ impl Tachometer<'_> {
 
     /// Keeps an outcome unless it says that nothing turns there.
     fn keep(&mut self, outcome: Outcome) {
-        if outcome.status == Status::Refused(Reason::NoRotation) {
+        let refused = outcome.status.reason().is_some();
+        if outcome.status == Status::Refused(Reason::NoRotation) || self.ignores_polarity && refused
+        {
             return;
         }
         let rank = |outcome: &Outcome| match outcome.status {
@@ -182,9 +192,14 @@ impl Tachometer<'_> {
         };
         let next = (index..self.candidates.len()).find(|i| !taken(&self.candidates[*i].found.disc));
         let Some(next) = next else {
-            if self.lost && !self.catching_up {
-                // What was lost is looked for in this very window, outside of what was not.
-                self.lost = false;
+            let unsure = |o: &Outcome| o.status == Status::Refused(Reason::Ambiguous);
+            let still_unsure = !self.ignores_polarity
+                && self.outcomes.iter().any(unsure)
+                && self.tracker.known().iter().any(Known::is_ambiguous);
+            if (self.lost || still_unsure) && !self.catching_up {
+                // In this very window, outside of what was not lost. Where nothing was, without polarity: before what is brighter
+                // than the blades here and darker there, an edge changes its own on the way round.
+                self.ignores_polarity = !core::mem::take(&mut self.lost);
                 self.search_anew();
             } else {
                 self.job = Job::Idle;

@@ -153,7 +153,13 @@ impl Extraction {
         let explainer = &mut scratch.explainer;
         let all = self.even.step(window, WINDING_PHASORS, inside, |event, at| {
             let (sin, cos) = rate.after(event.since(window.start_us) - mid_us).sin_cos();
-            explainer.add(Phasor { re: cos, im: -sin, amplitude: 1.0, on: event.is_on(), ..at });
+            explainer.add(Phasor {
+                re: cos,
+                im: -sin,
+                amplitude: 1.0,
+                on: window.is_on(event),
+                ..at
+            });
         });
         if all {
             explainer.collected(self.even.count());

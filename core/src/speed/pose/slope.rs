@@ -59,7 +59,7 @@ fn slips(points: &[Point], most_rad: f32) -> bool {
 impl Pose {
     /// Time that pixels take to tell edges rightly where the stream begins with the window: until each has seen one, and a slow one
     /// has got used to the light.
-    pub(super) fn unsettled_us(&self, window: &Window<'_>) -> f32 {
+    pub(super) fn settling_us(&self, window: &Window<'_>) -> f32 {
         let unsettled_us = larger(self.period_us / self.sectors as f32, SETTLING_US);
         let small = LEAST_SETTLED * unsettled_us <= self.window_us;
         if window.is_first() && small { unsettled_us } else { 0.0 }
@@ -70,11 +70,12 @@ impl Pose {
     ///
     /// What pixels tell before they have settled is believed where the rest bears it out and it tells more.
     pub(super) fn trend(&self, sums: &Sums) -> Option<Slope> {
-        let all = self.trend_after(0.0, sums)?;
+        let all = self.trend_after(0.0, sums);
         if self.unsettled_us <= 0.0 {
-            return Some(all);
+            return all;
         }
-        let Some(settled) = self.trend_after(self.unsettled_us, sums) else { return Some(all) };
+        let settled = self.trend_after(self.unsettled_us, sums);
+        let (Some(all), Some(settled)) = (all, settled) else { return all.or(settled) };
         let off_rad_s = (all.speed.omega_rad_s - settled.speed.omega_rad_s).abs();
         let sigma_rad_s = settled.speed.sigma_rad_s;
         // A hand did something meanwhile.

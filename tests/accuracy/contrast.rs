@@ -1,0 +1,80 @@
+//! Blades before what is brighter than they are on one side and darker on the other: an edge changes its polarity on the way round.
+
+use evtach_core::{Event, Geometry, Polarity, Status};
+use evtach_host::measure::Capacity;
+use evtach_host::synth::presets::hand;
+use evtach_host::synth::scene::Shape;
+use evtach_host::synth::{Motion, Rotor, Scene, generate};
+use evtach_tests::{Loaded, measure, show};
+
+/// Largest error in standard errors, and in permille.
+const LARGEST_ERROR_SIGMA: f64 = 4.0;
+const LARGEST_ERROR_PERMILLE: f64 = 1.0;
+
+/// As if what is behind a rotor were brighter than its blades right of a column, and darker left of it.
+fn before_two_tones(mut event: Event, column_px: f64) -> Event {
+    if f64::from(event.x) < column_px {
+        event.polarity = match event.polarity {
+            Polarity::On => Polarity::Off,
+            Polarity::Off => Polarity::On,
+        };
+    }
+    event
+}
+
+/// A rotor before an edge that lies so far right of its axis, in radii, with the memory lent.
+fn read(rotor: Rotor, edge: f64, from_hand: bool, capacity: Capacity) {
+    let mut scene =
+        Scene { seed: 31, duration_ms: 450.0, rotors: vec![rotor.clone()], ..Scene::default() };
+    if from_hand {
+        scene.camera = hand();
+    }
+    let made = generate(&scene).expect("a scene in range");
+    let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
+    let column_px = rotor.x_px + edge * rotor.radius_px;
+    let events = made.events.into_iter().map(|event| before_two_tones(event, column_px)).collect();
+    let (readings, _) = measure(&Loaded { geometry, events }, capacity);
+    let name = format!(
+        "{} blades, {} rpm, edge at {edge} radii, {}, {} memory",
+        rotor.blades,
+        rotor.rpm,
+        if from_hand { "hand" } else { "tripod" },
+        capacity.as_str()
+    );
+    let last = readings.iter().rev().find(|reading| reading.status == Status::Locked);
+    let last = last.unwrap_or_else(|| unreachable!("{name}: no lock in {readings:#?}"));
+    let [read] = &last.rotors[..] else { unreachable!("{name}: {:#?}", last.rotors) };
+    let half_s = 0.5e-6 * f64::from(last.window_us);
+    let middle_s = last.t_us as f64 * 1e-6;
+    let right_rpm = Motion::new(&scene).rpm_camera(0, middle_s - half_s, middle_s + half_s);
+    let right_rpm = right_rpm.expect("a rotor").abs();
+    let speed = read.speed.expect("a speed");
+    let off_rpm = f64::from(speed.rpm()) - right_rpm;
+    let (off_permille, off_sigma) =
+        (1e3 * off_rpm / right_rpm, off_rpm / f64::from(speed.rpm_sigma()));
+    let told = format!("{name}: {off_permille:+.3} permille, {off_sigma:+.1} sigma");
+    show(&told);
+    assert!(
+        off_permille.abs() < LARGEST_ERROR_PERMILLE && off_sigma.abs() < LARGEST_ERROR_SIGMA,
+        "{told}"
+    );
+    // Without polarity they cannot be counted: leading and trailing edges look alike.
+    assert!(read.blades.is_none_or(|blades| blades == rotor.blades), "{read:#?}");
+    let off_px = (f64::from(read.x_px) - rotor.x_px).hypot(f64::from(read.y_px) - rotor.y_px);
+    assert!(off_px < 0.25 * rotor.radius_px, "{read:#?}");
+}
+
+#[test]
+fn a_background_of_two_tones_does_not_hide_a_rotor() {
+    for (blades, rpm) in [(4, 620.0), (5, -1480.0), (6, 2900.0)] {
+        for edge in [0.0, 0.4] {
+            for (from_hand, capacity) in
+                [(false, Capacity::Full), (true, Capacity::Full), (true, Capacity::Device)]
+            {
+                // Blades as wide as the gaps: leading and trailing edges are half a period apart, and cancel.
+                let rotor = Rotor { blades, rpm, shape: Shape::Swept, ..Rotor::default() };
+                read(rotor, edge, from_hand, capacity);
+            }
+        }
+    }
+}
