@@ -102,7 +102,7 @@ pub fn evidence(readings: &[Reading], first_us: u64) -> String {
             );
             let _ = writeln!(
                 text,
-                "      initial {}  refined {} ± {}  further {}  lock {} ± {}  phase {} ± {}  fractional {}  sharp to {} px",
+                "      initial {}  refined {} ± {}  further {}  lock {} ± {}  phase {} ± {}  swing {}  fractional {}  sharp to {} px",
                 rpm(e.initial_rad_s),
                 rpm(e.refined_rad_s),
                 rpm(e.refined_sigma_rad_s),
@@ -111,6 +111,7 @@ pub fn evidence(readings: &[Reading], first_us: u64) -> String {
                 rpm(e.lock_sigma_rad_s),
                 rpm(e.phase_rad_s),
                 rpm(e.phase_sigma_rad_s),
+                rpm(e.swing_rad_s),
                 plain(e.fractional_deviation),
                 plain(e.sharpness_px)
             );
