@@ -3,12 +3,61 @@
 use heapless::Vec;
 
 use crate::limits::MAX_ROTORS;
-use crate::reading::{Reason, Status};
+use crate::math::sqrt;
+use crate::reading::{Reason, Speed, Status};
 use crate::rotors::{Disc, Found};
 use crate::speed::measurement::Outcome;
 
 /// Readings that a rotor's letter is kept for after it was last seen.
 const REMEMBERED: u8 = 20;
+/// A speed may differ from the one of a window that shares events with its own by this much, relative, by so many standard errors,
+/// and by what both accelerations make of the time between: what differs by more tells that one of them is wrong.
+const MOST_JUMP: f32 = 0.02;
+const JUMP_SIGMAS: f32 = 6.0;
+
+/// A speed that was measured, and when: low bits of microseconds.
+#[derive(Clone, Copy, Debug)]
+struct Told {
+    omega_rad_s: f32,
+    sigma_rad_s: f32,
+    alpha_rad_s2: f32,
+    middle_us: u32,
+    end_us: u32,
+}
+
+impl Told {
+    /// Nothing, which contradicts nothing.
+    const NOTHING: Self = Self {
+        omega_rad_s: 0.0,
+        sigma_rad_s: f32::INFINITY,
+        alpha_rad_s2: 0.0,
+        middle_us: 0,
+        end_us: 0,
+    };
+
+    fn new(speed: Speed, start_us: u64, duration_us: u32) -> Self {
+        let start_us = start_us as u32;
+        Self {
+            omega_rad_s: speed.omega_rad_s,
+            sigma_rad_s: speed.omega_sigma_rad_s,
+            alpha_rad_s2: speed.alpha_rad_s2.unwrap_or(0.0),
+            middle_us: start_us.wrapping_add(duration_us / 2),
+            end_us: start_us.wrapping_add(duration_us),
+        }
+    }
+
+    /// Whether a later speed cannot be right if this one is, measured from events of which some are the same from `start_us` on.
+    fn contradicts(&self, later: &Self, start_us: u64) -> bool {
+        let shared_us = self.end_us.wrapping_sub(start_us as u32).cast_signed();
+        let apart_s = later.middle_us.wrapping_sub(self.middle_us) as f32 * 1e-6;
+        let alpha_rad_s2 = self.alpha_rad_s2.abs() + later.alpha_rad_s2.abs();
+        let (a, b) = (self.sigma_rad_s, later.sigma_rad_s);
+        let most_rad_s = MOST_JUMP * self.omega_rad_s.abs()
+            + JUMP_SIGMAS * sqrt(a * a + b * b)
+            + alpha_rad_s2 * apart_s;
+        shared_us > 0 && (later.omega_rad_s - self.omega_rad_s).abs() > most_rad_s
+    }
+}
 
 /// A rotor that was seen.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +74,8 @@ pub struct Known {
     status: Status,
     /// Readings since it was last seen; 0 = in the last one.
     missed: u8,
+    /// Its speed when that was last measured.
+    told: Told,
 }
 
 impl Known {
@@ -82,10 +133,11 @@ impl Tracker {
         self.known.retain(|known| known.missed <= REMEMBERED);
     }
 
-    /// The letter of a rotor: that of the nearest known one within half a radius, else the first free.
-    pub fn identify(&mut self, outcome: &Outcome) -> u8 {
+    /// The letter of a rotor: that of the nearest known one within half a radius, else the first free. Where its speed contradicts what the
+    /// same events told before, it is refused: which of the two is right, the next one tells.
+    pub fn identify(&mut self, outcome: &mut Outcome, start_us: u64, duration_us: u32) -> u8 {
+        let now = outcome.speed.map(|speed| Told::new(speed, start_us, duration_us));
         let disc = outcome.found.disc;
-        let status = outcome.status;
         let near = |known: &Disc| {
             let reach = 0.5 * disc.radius_px.max(known.radius_px);
             disc.distance2(known) < reach * reach
@@ -95,10 +147,15 @@ impl Tracker {
                 disc.distance2(&a.found.disc).total_cmp(&disc.distance2(&b.found.disc))
             });
         if let Some(known) = nearest {
+            if now.is_some_and(|now| known.told.contradicts(&now, start_us)) {
+                outcome.status = Status::Refused(Reason::Ambiguous);
+                outcome.speed = None;
+            }
+            known.told = now.unwrap_or(known.told);
             known.found = outcome.found;
             known.parts = outcome.parts;
             known.alike = outcome.alike;
-            known.status = status;
+            known.status = outcome.status;
             known.missed = 0;
             return known.id;
         }
@@ -110,8 +167,9 @@ impl Tracker {
         {
             self.known.swap_remove(oldest);
         }
-        let (parts, alike) = (outcome.parts, outcome.alike);
-        self.known.push(Known { id, found: outcome.found, parts, alike, status, missed: 0 }).ok();
+        let told = now.unwrap_or(Told::NOTHING);
+        let Outcome { found, parts, alike, status, .. } = *outcome;
+        self.known.push(Known { id, found, parts, alike, status, missed: 0, told }).ok();
         id
     }
 }

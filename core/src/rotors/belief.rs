@@ -2,7 +2,7 @@
 
 use super::coherence::Phasor;
 use super::disc::Disc;
-use super::extraction::Found;
+use super::extraction::Candidate;
 use super::winding::{Explainer, Winding};
 use crate::math::{TAU, larger};
 
@@ -29,7 +29,7 @@ pub fn inside(phasor: &Phasor, part: &Disc) -> bool {
 }
 
 /// A rotor, when the winding is one to be believed.
-pub fn believe(explainer: &Explainer, line_hz: f32) -> Option<Found> {
+pub fn believe(explainer: &Explainer, line_hz: f32) -> Option<Candidate> {
     let (region, total, part, winding) = explainer.result();
     let Winding { share, share_in_step, windings, over_chance, .. } = winding;
     let thinned = total as f32 / region.len().max(1) as f32;
@@ -52,7 +52,7 @@ pub fn believe(explainer: &Explainer, line_hz: f32) -> Option<Found> {
     let in_phasors =
         |cell_px: f32| 0.5 * covering as f32 * thinned * cell_px * cell_px / larger(disc_px2, 1.0);
     let cover = explainer.cell_px().map_or(1.0, in_phasors);
-    (believed && cover > LEAST_COVER).then(|| Found {
+    (believed && cover > LEAST_COVER).then(|| Candidate {
         disc: Disc { radius_px, ..axis },
         omega_rad_s: line_hz * TAU / windings as f32,
         windings: windings.unsigned_abs(),
@@ -60,6 +60,5 @@ pub fn believe(explainer: &Explainer, line_hz: f32) -> Option<Found> {
         share,
         cover,
         explained: share * region.iter().map(|p| p.amplitude).sum::<f32>() * thinned,
-        ..Found::default()
     })
 }

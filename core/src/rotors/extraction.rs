@@ -42,6 +42,25 @@ use crate::store::{Even, Window};
 const COVERED: f32 = 1.1;
 
 /// A rotor as extraction sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// Axis and radius.
+    pub disc: Disc,
+    /// Speed in rad/s, positive = clockwise on the screen; good to the resolution of the spectrum.
+    pub omega_rad_s: f32,
+    /// Angular harmonic of the line it was found by.
+    pub windings: u32,
+    /// Frequency of that line in Hz.
+    pub line_hz: f32,
+    /// Share of the coherence map it explains.
+    pub share: f32,
+    /// Share of its disc that the map covers, counted in cells: above 1 where these are coarse.
+    pub cover: f32,
+    /// Events in step that it explains.
+    pub explained: f32,
+}
+
+/// A rotor as it was found, or as it was last measured: where measuring begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Found {
     /// Axis and radius.
@@ -52,18 +71,21 @@ pub struct Found {
     pub windings: u32,
     /// Frequency of that line in Hz.
     pub line_hz: f32,
-    /// Share of the coherence map it explains.
-    pub share: f32,
-    /// Share of its disc that the map covers, counted in cells: above 1 where these are coarse.
-    pub cover: f32,
-    /// Events in step that it explains.
-    pub explained: f32,
     /// Whether it was found, and is measured, without regard to polarity.
     pub ignores_polarity: bool,
     /// How it is tilted, once that was asked.
     pub tilt: Option<Tilt>,
     /// Root mean square speed of its axis in px/s, once it was followed: 0 on a tripod, tens in the hand.
     pub drift_px_s: f32,
+}
+
+impl Found {
+    /// As extraction found it, in view of polarity or without regard to it.
+    #[must_use]
+    pub fn new(candidate: &Candidate, ignores_polarity: bool) -> Self {
+        let Candidate { disc, omega_rad_s, windings, line_hz, .. } = *candidate;
+        Self { disc, omega_rad_s, windings, line_hz, ignores_polarity, ..Self::default() }
+    }
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -161,9 +183,9 @@ pub struct Extraction {
     /// Grid of the local map at hand.
     local: LocalGrid,
     /// What one rotation explains of the whole map.
-    whole: Option<Found>,
+    whole: Option<Candidate>,
     /// What rotations of their own explain of its parts.
-    parts: Vec<Found, MAX_CLUSTERS>,
+    parts: Vec<Candidate, MAX_CLUSTERS>,
     /// Frequencies in Hz that were in step all over.
     all_over: Vec<f32, MAX_LINES>,
     /// Lines looked into, and those in this quarter.
@@ -177,7 +199,7 @@ pub struct Extraction {
     /// Where all that moves lies, once what turns slowly is looked for.
     swept: Option<Disc>,
     /// Rotors by every line: the same one may stand here twice.
-    candidates: Vec<Found, MAX_CANDIDATES>,
+    candidates: Vec<Candidate, MAX_CANDIDATES>,
     in_step_hz: Option<f32>,
 }
 
@@ -266,7 +288,7 @@ impl Extraction {
     /// Rotors by every line, those that explain most events first: whoever takes one leaves out those that
     /// overlap it.
     #[must_use]
-    pub fn candidates(&self) -> &[Found] {
+    pub fn candidates(&self) -> &[Candidate] {
         &self.candidates
     }
 
@@ -306,7 +328,7 @@ impl Extraction {
     }
 
     /// Enters a rotor; the search goes on without what it covers.
-    fn take(&mut self, found: Found) {
+    fn take(&mut self, found: Candidate) {
         self.leave_out(found.disc);
         if self.quarter == 0 {
             self.tried.clear();
@@ -318,7 +340,7 @@ impl Extraction {
     /// Enters a candidate; when the list is full, in place of the one that explains least.
     // Nor this, in four.
     #[inline(never)]
-    fn enter(&mut self, candidate: Found) {
+    fn enter(&mut self, candidate: Candidate) {
         if let Err(candidate) = self.candidates.push(candidate)
             && let Some(least) =
                 self.candidates.iter_mut().min_by(|a, b| a.explained.total_cmp(&b.explained))

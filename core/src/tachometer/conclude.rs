@@ -46,8 +46,8 @@ impl Tachometer<'_> {
         let (offset_rad_s, sigma_rad_s) = account.rolled.offset(self.settings.gyro_sigma_rad_s);
         let roll = account.roll_rad_s().map(|heard| (heard - offset_rad_s, sigma_rad_s));
         let mut rotors = Vec::<RotorReading, MAX_ROTORS>::new();
-        for outcome in &self.outcomes {
-            let id = self.tracker.identify(outcome);
+        for outcome in &mut self.outcomes {
+            let id = self.tracker.identify(outcome, start_us, window_us);
             rotors.push(rotor_reading(id, outcome, self.settings.blades, roll)).ok();
         }
         sort_few(&mut rotors, |a, b| a.id < b.id);

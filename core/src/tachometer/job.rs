@@ -115,8 +115,7 @@ impl Tachometer<'_> {
                     self.in_step_hz = extraction.in_step_hz();
                     self.round = extraction.round();
                     for candidate in extraction.candidates() {
-                        let ignores_polarity = self.ignores_polarity;
-                        let found = Found { ignores_polarity, ..*candidate };
+                        let found = Found::new(candidate, self.ignores_polarity);
                         suspect(&mut self.candidates, found);
                     }
                     // What a search missed this time comes last, where nothing else was measured in its place.

@@ -1,6 +1,6 @@
 //! A look at what keeps step with a line: which rotation explains it.
 
-use super::{Extraction, For, Found, Scratch, Stage, View};
+use super::{Candidate, Extraction, For, Scratch, Stage, View};
 use crate::limits::WINDING_PHASORS;
 use crate::math::{TAU, TurnRate, sqrt};
 use crate::rotors::belief::{LEAST_PHASORS, believe, inside};
@@ -24,12 +24,12 @@ const MOST_CELL_SHARE: f32 = 0.3;
 const FEW_PHASORS: usize = 32;
 
 /// Whether what was found covers so little of its disc that it may be several rotors.
-fn is_sparse(found: &Found) -> bool {
+fn is_sparse(found: &Candidate) -> bool {
     found.cover < SPARSE
 }
 
 /// Whether what was found in the whole picture, or in a part of it, is one rotor for all that is known.
-pub(super) fn is_one(found: &Found) -> bool {
+pub(super) fn is_one(found: &Candidate) -> bool {
     found.share >= SHARE_OF_ONE || !is_sparse(found)
 }
 
