@@ -173,3 +173,48 @@ impl Tracker {
         id
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reading::Frame;
+
+    const WINDOW_US: u32 = 150_000;
+
+    fn told(omega_rad_s: f32, alpha_rad_s2: Option<f32>, start_us: u64) -> Told {
+        let speed =
+            Speed { omega_rad_s, omega_sigma_rad_s: 0.01, alpha_rad_s2, frame: Frame::Camera };
+        Told::new(speed, start_us, WINDOW_US)
+    }
+
+    /// Whether 100 rad/s, told from `start_us` on, are contradicted by what is told so much later.
+    fn contradicted(start_us: u64, later_us: u64, omega_rad_s: f32, alpha: Option<f32>) -> bool {
+        let later = told(omega_rad_s, alpha, start_us + later_us);
+        told(100.0, None, start_us).contradicts(&later, start_us + later_us)
+    }
+
+    #[test]
+    fn only_windows_that_share_events_contradict_each_other() {
+        // Also where the low bits of the time wrap meanwhile.
+        for start_us in [0, u64::from(u32::MAX) - 100_000] {
+            assert!(contradicted(start_us, 50_000, 103.0, None));
+            assert!(contradicted(start_us, 50_000, -100.0, None));
+            assert!(!contradicted(start_us, 50_000, 101.5, None));
+            assert!(!contradicted(start_us, 150_000, 103.0, None));
+        }
+    }
+
+    #[test]
+    fn what_accelerates_may_differ() {
+        // 5 rad/s within the 50 ms between the middles.
+        assert!(contradicted(0, 50_000, 105.0, Some(20.0)));
+        assert!(!contradicted(0, 50_000, 105.0, Some(100.0)));
+    }
+
+    #[test]
+    fn what_is_rough_may_differ() {
+        let rough = Told { sigma_rad_s: 1.0, ..told(105.0, None, 50_000) };
+        assert!(!told(100.0, None, 0).contradicts(&rough, 50_000));
+        assert!(!Told::NOTHING.contradicts(&rough, 50_000));
+    }
+}

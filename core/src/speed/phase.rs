@@ -82,6 +82,10 @@ pub struct Harmonics {
     pub share: f32,
     /// The same for the next best: near `share` where the pattern stands (flicker, vibration) or the centre is off.
     pub second_share: f32,
+    /// The same with all directions in step.
+    pub still_share: f32,
+    /// The same with as many windings the other way.
+    pub mirror_share: f32,
     /// The same for the best that could be taken for it about another centre. Not all directions in step, nor twice the
     /// harmonic: those two keep step with fast blades where a pixel that has just fired misses the next edge, so that the
     /// events of a rotor show where its blades were when the pixels first fired.
@@ -133,6 +137,8 @@ pub fn harmonics(angular: &AngularSums) -> Harmonics {
             found.second_share = found.second_share.max(*share);
         }
     }
+    found.still_share = shares[MOST_HARMONIC];
+    found.mirror_share = shares[(MOST_HARMONIC as i32 - found.best) as usize];
     for (term, share) in shares.into_iter().enumerate() {
         let harmonic = term as i32 - MOST_HARMONIC as i32;
         if ![0, found.best, 2 * found.best].contains(&harmonic) {

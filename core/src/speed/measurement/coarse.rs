@@ -22,6 +22,8 @@ const NEWTON_STEPS: u8 = 6;
 const LAST_STEP_PX: f32 = 0.1;
 /// Share in step of the second best harmonic over that of the best: beyond this the pattern stands, or the centre is off.
 const MOST_STANDING: f32 = 0.8;
+/// Pixels along the rim from one blade to the next below which there are none to be seen: what keeps step is a lamp's light.
+const LEAST_APART_PX: f32 = 5.0;
 /// Two coarse speeds contradict each other when they differ by more than half the way to the next speed that the line
 /// could also mean (its frequency over one winding more), but within these shares: registration of thin
 /// slices falls short of the turn by up to a tenth.
@@ -123,6 +125,12 @@ impl Measurement {
         }
         if standing > MOST_STANDING {
             return self.refuse(Reason::Ambiguous);
+        }
+        if TAU * self.disc.radius_px < LEAST_APART_PX * self.harmonic as f32 {
+            return self.refuse(Reason::NoRotation);
+        }
+        if self.strobes(polar, &scan) {
+            return self.refuse(Reason::TooFast);
         }
         self.windings = self.harmonic;
         self.turn = 0;

@@ -2,11 +2,17 @@
 //! third of them, say. Where all pixels first fired at the same blade (a camera that was just switched on, a flash), the events
 //! of all the rotor then come in bursts, and the pattern keeps step with a third of its speed as well as with its own, winding as
 //! often around the axis. A rigid rotor's does not: of the harmonic m, it keeps step with its own speed alone.
+//!
+//! Jitter of half of its own period hides the true speed. But then the pattern keeps step with the frequency at hand with
+//! other windings, too: with none, or as many the other way. A rigid rotor's does so only as far as it is seen unevenly around.
+//!
+//! A lamp that lights the blades in flashes does the same to their frequency: with its own added or taken off, the pattern keeps
+//! step, too. Where it keeps more step so, the frequency at hand is not the blades'.
 
 use super::{Measurement, Stage};
 use crate::math::TAU;
 use crate::reading::Reason;
-use crate::speed::phase::Pattern;
+use crate::speed::phase::{Harmonics, Pattern};
 use crate::speed::polar::PolarEvent;
 use crate::store::Window;
 
@@ -26,6 +32,8 @@ const HIGHER: [f32; 11] = [
     3.0,
 ];
 const LOWER: [f32; 4] = [1.0 / 3.0, 1.0 / 2.0, 3.0 / 5.0, 2.0 / 3.0];
+/// What a lamp that lights the rotor adds to the harmonic's frequency, or takes from it, in Hz.
+const LAMPS_HZ: [f32; 4] = [-120.0, -100.0, 100.0, 120.0];
 /// Share in step with another speed over that with the one at hand from which on either may be the rotor's. With a higher one
 /// rigid rotors of two blades or more reach 0.30 in random scenes, mistaken speeds 0.34 and more.
 const MOST_HIGHER: f32 = 0.32;
@@ -33,6 +41,9 @@ const MOST_LOWER: f32 = 1.1;
 /// The same with twice or thrice the speed where the parts differ or there is but one, which about an axis that is not found
 /// exactly does not turn evenly: rigid ones reach 0.36, mistaken speeds 0.43 and more.
 const MOST_UNEVEN: f32 = 0.4;
+/// Share in step with other windings over that with the ones at hand, less what uneven sight makes, from which on it is no rigid
+/// rotor's: these reach 0.11 in random scenes, and 0.31 of a few hundred events; mistaken speeds 0.4 and more.
+const MOST_OTHER_WINDINGS: f32 = 0.35;
 /// Frequency of the harmonic in Hz below which no pixel takes so long to recover. A single mark's is asked lower: where half its speed
 /// is told, nothing else speaks against that.
 const SLOWEST_HZ: f32 = 200.0;
@@ -41,7 +52,20 @@ const SLOWEST_MARK_HZ: f32 = 100.0;
 const LEAST_PERIODS: f32 = 14.0;
 
 impl Measurement {
-    /// Asks whether the pattern keeps step with another speed too, one a step. Cost: about 150 instructions an event and step.
+    /// Whether the pattern keeps step with other windings, too. Cost: about 100 instructions an event.
+    pub(super) fn strobes(&self, polar: &[PolarEvent], scan: &Harmonics) -> bool {
+        let line_hz = self.omega_rad_s.abs() * self.harmonic as f32 / TAU;
+        // How unevenly it is seen: the harmonics of where its events are, whenever they came.
+        let uneven =
+            |harmonic| Pattern::learn(polar, self.disc, 0.0, harmonic).coherence() * scan.share;
+        let most = MOST_OTHER_WINDINGS * scan.share;
+        line_hz > SLOWEST_HZ
+            && self.harmonic > 1
+            && (scan.still_share - uneven(self.harmonic) > most
+                || scan.mirror_share - uneven(2 * self.harmonic) > most)
+    }
+
+    /// Asks whether the pattern keeps step with another speed too, one a step: of the rotor's own, or of a lamp's making. Cost: about 150 instructions an event and step.
     pub(super) fn recovery(&mut self, window: &Window<'_>, polar: &[PolarEvent]) {
         let line_hz = self.omega_rad_s.abs() * self.harmonic as f32 / TAU;
         let periods = line_hz * window.duration_us as f32 * 1e-6;
@@ -50,7 +74,9 @@ impl Measurement {
         let asked = line_hz > slowest_hz && periods > LEAST_PERIODS;
         let uneven = mark || !self.alike;
         let higher = |s| (s, if uneven && s >= 2.0 { MOST_UNEVEN } else { MOST_HIGHER });
-        let speeds = HIGHER.map(higher).into_iter().chain(LOWER.map(|s| (s, MOST_LOWER)));
+        let lit = LAMPS_HZ.map(|lamp_hz| 1.0 + lamp_hz / line_hz);
+        let lower = LOWER.into_iter().chain(lit).map(|s| (s, MOST_LOWER));
+        let speeds = HIGHER.map(higher).into_iter().chain(lower);
         let Some((speed, most)) = speeds.filter(|_| asked).nth(usize::from(self.turn)) else {
             self.turn = 0;
             self.stage = Stage::Pose;
@@ -60,7 +86,8 @@ impl Measurement {
         let omega_rad_s = speed * self.omega_rad_s;
         let share = Pattern::learn(polar, self.disc, omega_rad_s, self.harmonic).coherence();
         if share > most * self.evidence.coherence.unwrap_or(0.0) {
-            self.refuse(Reason::TooFast);
+            let lamp = usize::from(self.turn) > HIGHER.len() + LOWER.len();
+            self.refuse(if lamp { Reason::Flicker } else { Reason::TooFast });
         }
     }
 }

@@ -40,6 +40,9 @@ const LOCK_SIGMAS: f32 = 8.0;
 /// slices of a fast rotor that is looked at from aside fall short by a twentieth.
 const REFINED_AGREEMENT: f32 = 0.1;
 const REFINED_SIGMAS: f32 = 5.0;
+/// Standard errors by which it denies a speed all the same, where it is within the other of the next harmonic's.
+const REFINED_OFF_SIGMAS: f32 = 1.5;
+const REFINED_RIVAL_SIGMAS: f32 = 1.0;
 /// Own standard errors beyond which they contradict each other from a moving camera: one of the two went astray with the axis.
 const ASTRAY_SIGMAS: f32 = 4.0;
 /// A lock with a larger relative error is only coarse.
@@ -93,7 +96,9 @@ impl Measurement {
         };
         let lock = witness(self.evidence.lock_rad_s, self.evidence.lock_sigma_rad_s)
             .map(|lock| self.with_bias(lock));
-        let phase = witness(self.evidence.phase_rad_s, self.evidence.phase_sigma_rad_s);
+        // One that may be farther off than any reading may be bears nothing out.
+        let phase = witness(self.evidence.phase_rad_s, self.evidence.phase_sigma_rad_s)
+            .filter(|phase| phase.sigma_rad_s < MOST_ERROR * phase.omega_rad_s.abs());
         let window_s = window.duration_us as f32 * 1e-6;
         let held_up = QUEUE_SIGMA * stretch(window, self.disc, self.evidence.periods);
         // What jitter leads astray says nothing.
@@ -199,8 +204,13 @@ impl Measurement {
         else {
             return false;
         };
-        let most = (REFINED_SIGMAS * sigma).max(REFINED_AGREEMENT * omega_rad_s.abs());
-        (refined - omega_rad_s).abs() > most
+        let off = refined / omega_rad_s - 1.0;
+        let sigma = sigma / omega_rad_s.abs();
+        // The speed by one winding less is higher, by one more lower.
+        let rival = 1.0 / (self.windings as f32 - 1.0_f32.copysign(off));
+        let is_rival = off.abs() > REFINED_OFF_SIGMAS * sigma
+            && (off.abs() - rival).abs() < REFINED_RIVAL_SIGMAS * sigma;
+        is_rival || off.abs() > (REFINED_SIGMAS * sigma).max(REFINED_AGREEMENT)
     }
 
     /// Whether jitter may scatter the blades' edges over so much of their distance that a registration matches noise: no overtone is
