@@ -44,10 +44,10 @@ pub const MAX_BLADES: u8 = 8;
 /// Slice pairs at one baseline.
 pub const MAX_PAIRS: usize = 128;
 
-/// Rotors by every line before the choice: 20 x 32 B.
+/// Rotors by every line before the choice: 20 x 36 B.
 pub const MAX_CANDIDATES: usize = 20;
 
-/// Of these, those that are measured in one window at most: 12 x 36 B.
+/// Of these, those that are measured in one window at most: 12 x 48 B.
 pub const MAX_SUSPECTS: usize = 12;
 
 /// Knots of a rotor's path through the window: 64 x 12 B.
