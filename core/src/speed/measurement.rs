@@ -105,6 +105,8 @@ pub struct Measurement {
     /// Frequency and angular harmonic of the line that the rotor was found by.
     line_hz: f32,
     windings: u32,
+    /// Share in step with that line without windings, and with as many the other way, over its own.
+    other_windings: [f32; 2],
     events: usize,
     parts: Option<u8>,
     alike: bool,
@@ -141,6 +143,7 @@ impl Measurement {
             tilt: found.tilt,
             line_hz: found.line_hz,
             windings: found.windings,
+            other_windings: [0.0; 2],
             events: 0,
             parts: None,
             alike: true,

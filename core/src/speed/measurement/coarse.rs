@@ -129,9 +129,8 @@ impl Measurement {
         if TAU * self.disc.radius_px < LEAST_APART_PX * self.harmonic as f32 {
             return self.refuse(Reason::NoRotation);
         }
-        if self.strobes(polar, &scan) {
-            return self.refuse(Reason::TooFast);
-        }
+        self.other_windings =
+            [scan.still_share, scan.mirror_share].map(|share| share / scan.share.max(1e-3));
         self.windings = self.harmonic;
         self.turn = 0;
         self.stage = Stage::Symmetry;

@@ -12,7 +12,7 @@
 use super::{Measurement, Stage};
 use crate::math::TAU;
 use crate::reading::Reason;
-use crate::speed::phase::{Harmonics, Pattern};
+use crate::speed::phase::Pattern;
 use crate::speed::polar::PolarEvent;
 use crate::store::Window;
 
@@ -52,41 +52,40 @@ const SLOWEST_MARK_HZ: f32 = 100.0;
 const LEAST_PERIODS: f32 = 14.0;
 
 impl Measurement {
-    /// Whether the pattern keeps step with other windings, too. Cost: about 100 instructions an event.
-    pub(super) fn strobes(&self, polar: &[PolarEvent], scan: &Harmonics) -> bool {
-        let line_hz = self.omega_rad_s.abs() * self.harmonic as f32 / TAU;
-        // How unevenly it is seen: the harmonics of where its events are, whenever they came.
-        let uneven =
-            |harmonic| Pattern::learn(polar, self.disc, 0.0, harmonic).coherence() * scan.share;
-        let most = MOST_OTHER_WINDINGS * scan.share;
-        line_hz > SLOWEST_HZ
-            && self.harmonic > 1
-            && (scan.still_share - uneven(self.harmonic) > most
-                || scan.mirror_share - uneven(2 * self.harmonic) > most)
-    }
-
-    /// Asks whether the pattern keeps step with another speed too, one a step: of the rotor's own, or of a lamp's making. Cost: about 150 instructions an event and step.
+    /// Asks whether the pattern keeps step with other windings too, or with another speed, of the rotor's own or of a lamp's making: one a
+    /// step. Cost: about 150 instructions an event and step.
     pub(super) fn recovery(&mut self, window: &Window<'_>, polar: &[PolarEvent]) {
         let line_hz = self.omega_rad_s.abs() * self.harmonic as f32 / TAU;
         let periods = line_hz * window.duration_us as f32 * 1e-6;
         let mark = self.parts == Some(1);
         let slowest_hz = if mark { SLOWEST_MARK_HZ } else { SLOWEST_HZ };
         let asked = line_hz > slowest_hz && periods > LEAST_PERIODS;
+        let turn = usize::from(self.turn);
+        self.turn += 1;
+        if let Some(share) = self.other_windings.get(turn) {
+            // How unevenly it is seen: the harmonics of where its events are, whenever they came.
+            let harmonic = u32::from(self.turn) * self.windings;
+            let unevenly = || Pattern::learn(polar, self.disc, 0.0, harmonic).coherence();
+            if asked && self.windings > 1 && share - unevenly() > MOST_OTHER_WINDINGS {
+                self.refuse(Reason::TooFast);
+            }
+            return;
+        }
         let uneven = mark || !self.alike;
         let higher = |s| (s, if uneven && s >= 2.0 { MOST_UNEVEN } else { MOST_HIGHER });
         let lit = LAMPS_HZ.map(|lamp_hz| 1.0 + lamp_hz / line_hz);
         let lower = LOWER.into_iter().chain(lit).map(|s| (s, MOST_LOWER));
-        let speeds = HIGHER.map(higher).into_iter().chain(lower);
-        let Some((speed, most)) = speeds.filter(|_| asked).nth(usize::from(self.turn)) else {
+        let mut speeds = HIGHER.map(higher).into_iter().chain(lower).filter(|_| asked);
+        let number = turn - self.other_windings.len();
+        let Some((speed, most)) = speeds.nth(number) else {
             self.turn = 0;
             self.stage = Stage::Pose;
             return;
         };
-        self.turn += 1;
         let omega_rad_s = speed * self.omega_rad_s;
         let share = Pattern::learn(polar, self.disc, omega_rad_s, self.harmonic).coherence();
         if share > most * self.evidence.coherence.unwrap_or(0.0) {
-            let lamp = usize::from(self.turn) > HIGHER.len() + LOWER.len();
+            let lamp = number >= HIGHER.len() + LOWER.len();
             self.refuse(if lamp { Reason::Flicker } else { Reason::TooFast });
         }
     }
