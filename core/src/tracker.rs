@@ -10,8 +10,8 @@ use crate::speed::measurement::Outcome;
 
 /// Readings that a rotor's letter is kept for after it was last seen.
 const REMEMBERED: u8 = 20;
-/// A speed may differ from the one of a window that shares events with its own by this much, relative, by so many standard errors,
-/// and by what both accelerations make of the time between: what differs by more tells that one of them is wrong.
+/// A speed may differ from the one that the beginning of its window told by this much, relative, by so many standard errors, and by what both
+/// accelerations make of the time between: what differs by more tells that one of them is wrong.
 const MOST_JUMP: f32 = 0.02;
 const JUMP_SIGMAS: f32 = 6.0;
 
@@ -21,8 +21,8 @@ struct Told {
     omega_rad_s: f32,
     sigma_rad_s: f32,
     alpha_rad_s2: f32,
+    start_us: u32,
     middle_us: u32,
-    end_us: u32,
 }
 
 impl Told {
@@ -31,8 +31,8 @@ impl Told {
         omega_rad_s: 0.0,
         sigma_rad_s: f32::INFINITY,
         alpha_rad_s2: 0.0,
+        start_us: 0,
         middle_us: 0,
-        end_us: 0,
     };
 
     fn new(speed: Speed, start_us: u64, duration_us: u32) -> Self {
@@ -41,21 +41,22 @@ impl Told {
             omega_rad_s: speed.omega_rad_s,
             sigma_rad_s: speed.omega_sigma_rad_s,
             alpha_rad_s2: speed.alpha_rad_s2.unwrap_or(0.0),
+            start_us,
             middle_us: start_us.wrapping_add(duration_us / 2),
-            end_us: start_us.wrapping_add(duration_us),
         }
     }
 
-    /// Whether a later speed cannot be right if this one is, measured from events of which some are the same from `start_us` on.
-    fn contradicts(&self, later: &Self, start_us: u64) -> bool {
-        let shared_us = self.end_us.wrapping_sub(start_us as u32).cast_signed();
-        let apart_s = later.middle_us.wrapping_sub(self.middle_us) as f32 * 1e-6;
-        let alpha_rad_s2 = self.alpha_rad_s2.abs() + later.alpha_rad_s2.abs();
-        let (a, b) = (self.sigma_rad_s, later.sigma_rad_s);
+    /// Whether the speed of a longer window that began with this one's events cannot be right if this one is. Not where the window has
+    /// moved on: a motor may hunt.
+    fn contradicts(&self, longer: &Self) -> bool {
+        let apart_s = longer.middle_us.wrapping_sub(self.middle_us) as f32 * 1e-6;
+        let alpha_rad_s2 = self.alpha_rad_s2.abs() + longer.alpha_rad_s2.abs();
+        let (a, b) = (self.sigma_rad_s, longer.sigma_rad_s);
         let most_rad_s = MOST_JUMP * self.omega_rad_s.abs()
             + JUMP_SIGMAS * sqrt(a * a + b * b)
             + alpha_rad_s2 * apart_s;
-        shared_us > 0 && (later.omega_rad_s - self.omega_rad_s).abs() > most_rad_s
+        self.start_us == longer.start_us
+            && (longer.omega_rad_s - self.omega_rad_s).abs() > most_rad_s
     }
 }
 
@@ -134,7 +135,7 @@ impl Tracker {
     }
 
     /// The letter of a rotor: that of the nearest known one within half a radius, else the first free. Where its speed contradicts what the
-    /// same events told before, it is refused: which of the two is right, the next one tells.
+    /// beginning of the same window told before, it is refused: which of the two is right, the next one tells.
     pub fn identify(&mut self, outcome: &mut Outcome, start_us: u64, duration_us: u32) -> u8 {
         let now = outcome.speed.map(|speed| Told::new(speed, start_us, duration_us));
         let disc = outcome.found.disc;
@@ -147,7 +148,7 @@ impl Tracker {
                 disc.distance2(&a.found.disc).total_cmp(&disc.distance2(&b.found.disc))
             });
         if let Some(known) = nearest {
-            if now.is_some_and(|now| known.told.contradicts(&now, start_us)) {
+            if now.is_some_and(|now| known.told.contradicts(&now)) {
                 outcome.status = Status::Refused(Reason::Ambiguous);
                 outcome.speed = None;
             }
@@ -179,42 +180,40 @@ mod tests {
     use super::*;
     use crate::reading::Frame;
 
-    const WINDOW_US: u32 = 150_000;
-
-    fn told(omega_rad_s: f32, alpha_rad_s2: Option<f32>, start_us: u64) -> Told {
+    fn told(omega_rad_s: f32, alpha_rad_s2: Option<f32>, start_us: u64, window_us: u32) -> Told {
         let speed =
             Speed { omega_rad_s, omega_sigma_rad_s: 0.01, alpha_rad_s2, frame: Frame::Camera };
-        Told::new(speed, start_us, WINDOW_US)
+        Told::new(speed, start_us, window_us)
     }
 
-    /// Whether 100 rad/s, told from `start_us` on, are contradicted by what is told so much later.
+    /// Whether 100 rad/s, told of 150 ms, are contradicted by what is told of the 300 ms that begin so much later.
     fn contradicted(start_us: u64, later_us: u64, omega_rad_s: f32, alpha: Option<f32>) -> bool {
-        let later = told(omega_rad_s, alpha, start_us + later_us);
-        told(100.0, None, start_us).contradicts(&later, start_us + later_us)
+        let longer = told(omega_rad_s, alpha, start_us + later_us, 300_000);
+        told(100.0, None, start_us, 150_000).contradicts(&longer)
     }
 
     #[test]
-    fn only_windows_that_share_events_contradict_each_other() {
+    fn a_window_that_holds_all_of_another_does_not_tell_another_speed() {
         // Also where the low bits of the time wrap meanwhile.
         for start_us in [0, u64::from(u32::MAX) - 100_000] {
-            assert!(contradicted(start_us, 50_000, 103.0, None));
-            assert!(contradicted(start_us, 50_000, -100.0, None));
-            assert!(!contradicted(start_us, 50_000, 101.5, None));
-            assert!(!contradicted(start_us, 150_000, 103.0, None));
+            assert!(contradicted(start_us, 0, 103.0, None));
+            assert!(contradicted(start_us, 0, -100.0, None));
+            assert!(!contradicted(start_us, 0, 101.5, None));
+            assert!(!contradicted(start_us, 50_000, 103.0, None));
         }
     }
 
     #[test]
     fn what_accelerates_may_differ() {
-        // 5 rad/s within the 50 ms between the middles.
-        assert!(contradicted(0, 50_000, 105.0, Some(20.0)));
-        assert!(!contradicted(0, 50_000, 105.0, Some(100.0)));
+        // 7.5 rad/s within the 75 ms between the middles.
+        assert!(contradicted(0, 0, 105.0, Some(20.0)));
+        assert!(!contradicted(0, 0, 105.0, Some(100.0)));
     }
 
     #[test]
     fn what_is_rough_may_differ() {
-        let rough = Told { sigma_rad_s: 1.0, ..told(105.0, None, 50_000) };
-        assert!(!told(100.0, None, 0).contradicts(&rough, 50_000));
-        assert!(!Told::NOTHING.contradicts(&rough, 50_000));
+        let rough = Told { sigma_rad_s: 1.0, ..told(105.0, None, 0, 300_000) };
+        assert!(!told(100.0, None, 0, 150_000).contradicts(&rough));
+        assert!(!Told::NOTHING.contradicts(&rough));
     }
 }
