@@ -42,7 +42,7 @@ const MOST_LOWER: f32 = 1.1;
 /// exactly does not turn evenly: rigid ones reach 0.36, mistaken speeds 0.43 and more.
 const MOST_UNEVEN: f32 = 0.4;
 /// Share in step with other windings over that with the ones at hand, less what uneven sight makes, from which on it is no rigid
-/// rotor's: these reach 0.11 in random scenes, and 0.31 of a few hundred events; mistaken speeds 0.4 and more.
+/// rotor's: these reach 0.11 in random scenes, and 0.31 of a few hundred events; mistaken speeds 0.49 and more.
 const MOST_OTHER_WINDINGS: f32 = 0.35;
 /// Frequency of the harmonic in Hz below which no pixel takes so long to recover. A single mark's is asked lower: where half its speed
 /// is told, nothing else speaks against that.
