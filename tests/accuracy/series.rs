@@ -142,9 +142,12 @@ fn a_motor_that_speeds_up() {
 /// A governor's waves: within a window the speed changes by more than a hundred times its sigma, and up to nearly one wave.
 #[test]
 fn a_motor_that_hunts() {
-    for (seed, hunting_hz) in [(92, 2.0), (93, 4.0), (94, 6.0)] {
-        let rotor = Rotor { rpm: 3000.0, hunting: 0.01, hunting_hz, ..Rotor::default() };
-        every_reading(&format!("1 % at {hunting_hz} Hz"), &scene(seed, vec![rotor]));
+    let waves =
+        [(92, 0.01, 2.0), (93, 0.01, 4.0), (94, 0.01, 6.0), (195, 0.02, 6.0), (95, 0.05, 4.0)];
+    for (seed, hunting, hunting_hz) in waves {
+        let rotor = Rotor { rpm: 3000.0, hunting, hunting_hz, ..Rotor::default() };
+        let name = format!("{} % at {hunting_hz} Hz", 100.0 * hunting);
+        every_reading(&name, &scene(seed, vec![rotor]));
     }
 }
 

@@ -22,6 +22,14 @@ pub fn root_mean_square(a: f32, b: f32) -> f32 {
     sqrt(0.5 * (a * a + b * b))
 }
 
+/// Standard error of what has two that know nothing of each other.
+#[must_use]
+// Nor this.
+#[inline(never)]
+pub fn root_sum_square(a: f32, b: f32) -> f32 {
+    sqrt(a * a + b * b)
+}
+
 /// 97.5 % point of Student's t over that of the normal distribution, so that +/- 1.96 sigma covers 95 %
 /// although sigma itself was estimated from few values.
 #[must_use]

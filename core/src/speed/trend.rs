@@ -47,6 +47,8 @@ pub struct Trend {
     pub bend_error: f32,
     /// Mean square by which the trend is bent away from a straight line.
     pub bent: f32,
+    /// The same from the parabola.
+    pub bent_beside: f32,
     /// Points beyond those that the fit takes up.
     pub degrees_of_freedom: usize,
 }
@@ -86,12 +88,6 @@ impl Points<'_> {
 }
 
 impl Trend {
-    /// By how much it is bent beside the bend: the mean square of (3 u^2 - 1) / 6 is 1 / 45.
-    #[must_use]
-    pub fn bent_beside_bend(&self) -> f32 {
-        self.bent - self.bend * self.bend / 45.0
-    }
-
     /// Fits a trend, with an offset of its own for every `fold`-th point: points i and i + fold share one. `None` when
     /// too few points are left. At most [`MOST_POINTS`] count. Cost: about 10 instructions a point and degree squared.
     #[must_use]
@@ -159,18 +155,18 @@ impl Trend {
             // exp(-x / 2), but for what is hardly likely.
             let likely = (0..4).fold(1.0 / (1.0 + (cost - least) / 32.0), |x, _| x * x);
             whole += likely;
-            let Self { slope, slope_error, bend_error, bent, .. } = *trend;
+            let Self { slope, slope_error, bend_error, bent_beside, .. } = *trend;
             let moments = [
                 slope,
                 slope * slope,
                 slope_error * slope_error,
                 bend_error * bend_error,
-                bent,
+                bent_beside,
                 trend.degrees_of_freedom as f32,
             ];
             mean.iter_mut().zip(moments).for_each(|(mean, moment)| *mean += likely * moment);
         }
-        let [slope, square, variance, bend_variance, bent, degrees_of_freedom] =
+        let [slope, square, variance, bend_variance, bent_beside, degrees_of_freedom] =
             mean.map(|m| m / whole);
         let weight: f32 = points.points.iter().map(|p| p.weight).sum();
         Some(Self {
@@ -178,7 +174,8 @@ impl Trend {
             slope_error: sqrt(variance + (square - slope * slope).max(0.0)),
             bend: bend * coefficients[1],
             bend_error: bend * sqrt(bend_variance),
-            bent: bent / weight,
+            bent: (bent_beside + coefficients[1] * coefficients[1]) / weight,
+            bent_beside: bent_beside / weight,
             degrees_of_freedom: degrees_of_freedom as usize,
         })
     }
@@ -189,7 +186,7 @@ impl Trend {
 /// `free` points. The bend's error is that of the second coefficient.
 fn shrunk(terms: (&[f32], &[f32]), squares: f32, free: usize, size: f32) -> (f32, Trend) {
     let (mut sum, mut cost, mut slope, mut share, mut taken) = (squares, 0.0, 0.0, 0.0, 0.0);
-    let mut bent = 0.0;
+    let mut bent_beside = 0.0;
     for (index, (s, c)) in terms.0.iter().zip(terms.1).enumerate() {
         // A parabola always: its bend is asked for.
         let kept = if index + 1 < FIRST_BEND {
@@ -204,7 +201,7 @@ fn shrunk(terms: (&[f32], &[f32]), squares: f32, free: usize, size: f32) -> (f32
         slope += kept * s * c;
         share += kept * s * s;
         taken += kept;
-        bent += if index > 0 { kept * c * c } else { 0.0 };
+        bent_beside += if index > 1 { kept * c * c } else { 0.0 };
     }
     let n = (free + 1 - FIRST_BEND) as f32;
     let variance = sum / n;
@@ -213,7 +210,8 @@ fn shrunk(terms: (&[f32], &[f32]), squares: f32, free: usize, size: f32) -> (f32
         slope_error: sqrt(variance * share),
         bend: 0.0,
         bend_error: sqrt(variance * (1.0 + size)),
-        bent,
+        bent: 0.0,
+        bent_beside,
         degrees_of_freedom: (free as f32 - taken) as usize,
     };
     (cost + n * ln(sum.max(f32::MIN_POSITIVE)), found)
@@ -269,7 +267,7 @@ mod tests {
         let bent = 0.05 * 0.05 * 0.196;
         assert!((found.bent / bent - 1.0).abs() < 0.2, "{found:?}");
         let parabola = Trend::fit(&points(1e-3, |u| 0.3 * u + 0.1 * u * u), 1).unwrap_or_default();
-        assert!(parabola.bent > 4e-4 && parabola.bent_beside_bend().abs() < 1e-5, "{parabola:?}");
+        assert!(parabola.bent > 4e-4 && parabola.bent_beside < 1e-5, "{parabola:?}");
         let straight = Trend::fit(&points(1e-3, |u| 0.3 * u), 1).unwrap_or_default();
         assert!(straight.bent < 1e-7, "{straight:?}");
     }

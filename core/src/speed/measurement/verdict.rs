@@ -3,10 +3,11 @@
 use super::super::baseline::Estimate;
 use super::baselines::FRACTION;
 use super::doubt::SMALL_PX;
-use super::{ACCELERATION_SIGMAS, Measurement, Stated};
+use super::{ACCELERATION_SIGMAS, Measurement, Stated, TILTED_PARTS};
 use crate::math::{TAU, sqrt};
 use crate::reading::{Evidence, Reason, Status};
 use crate::speed::queue::stretch;
+use crate::speed::statistics::root_sum_square;
 use crate::store::Window;
 use crate::tachometer::BASE_WINDOW_US;
 
@@ -65,6 +66,8 @@ const COARSE_SPREAD: f32 = 0.5;
 /// queue may stretch the window by, must each fit into it.
 const MOST_ERROR: f32 = 0.01;
 const COARSE_SIGMAS: f32 = 3.0;
+/// Standard error of a coarse reading of less than three blades, as a share of how much its speed seems to swing.
+const UNEVEN_SHARE: f32 = 0.5;
 /// The largest relative error where the stream ended before a window was full.
 const MOST_SHORT_SIGMA: f32 = 0.012;
 /// What a hand shakes, in pixels, and blocks of a turn from which on a single mark's axis is told from the mark.
@@ -121,12 +124,12 @@ impl Measurement {
             } else if sharp {
                 // Right if the parts are as alike as they look: the window shows too few to be sure.
                 let spread = ALIKE_SIGMA * self.estimate.sigma_rad_s;
-                let sigma_rad_s = sqrt(both.sigma_rad_s * both.sigma_rad_s + spread * spread);
+                let sigma_rad_s = root_sum_square(both.sigma_rad_s, spread);
                 self.estimate = Estimate { sigma_rad_s, ..both };
             } else {
                 // Too rough for a lock, and no better than either.
                 let spread = self.estimate.sigma_rad_s;
-                let sigma_rad_s = sqrt(both.sigma_rad_s * both.sigma_rad_s + spread * spread);
+                let sigma_rad_s = root_sum_square(both.sigma_rad_s, spread);
                 self.estimate = Estimate { sigma_rad_s, ..both };
             }
         }
@@ -186,7 +189,7 @@ impl Measurement {
         let scatter = lock_sigma_rad_s.zip(phase_sigma_rad_s).map_or(0.0, |(a, b)| a * a + b * b);
         if apart_rad_s > ASTRAY_SIGMAS * sqrt(scatter) {
             let Estimate { omega_rad_s, sigma_rad_s: own } = self.estimate;
-            self.estimate.sigma_rad_s = sqrt(own * own + 0.25 * apart_rad_s * apart_rad_s);
+            self.estimate.sigma_rad_s = root_sum_square(own, 0.5 * apart_rad_s);
             let sharp = self.estimate.sigma_rad_s < MOST_LOCK_SIGMA * omega_rad_s.abs();
             if self.status == Status::Locked && !sharp {
                 self.status = Status::Coarse;
@@ -289,8 +292,7 @@ impl Measurement {
     /// Adds to the lock's error what may bias all its registrations alike.
     fn with_bias(&self, lock: Estimate) -> Estimate {
         let bias = BIAS_RAD / self.lock_baseline_s.max(f32::MIN_POSITIVE);
-        let own = lock.sigma_rad_s;
-        Estimate { sigma_rad_s: sqrt(own * own + bias * bias), ..lock }
+        Estimate { sigma_rad_s: root_sum_square(lock.sigma_rad_s, bias), ..lock }
     }
 
     /// The reading of a single mark is as good as its axis holds still: what the mark does and what the camera does look alike, where it
@@ -301,8 +303,7 @@ impl Measurement {
         if self.parts == Some(1) || self.parts == Some(2) && !self.alike {
             let turn_rad = self.evidence.periods.unwrap_or(0.0) * TAU;
             let shake = shake_px / (self.disc.radius_px * turn_rad) * self.omega_rad_s;
-            let own = self.estimate.sigma_rad_s;
-            self.estimate.sigma_rad_s = sqrt(own * own + shake * shake);
+            self.estimate.sigma_rad_s = root_sum_square(self.estimate.sigma_rad_s, shake);
         }
     }
 
@@ -311,11 +312,15 @@ impl Measurement {
     /// what the camera may turn by.
     fn widen_coarse(&mut self, window: &Window<'_>, stretch: f32, roll_rad_s: f32) {
         self.widen_mark(SHAKE_PX);
+        if self.parts.is_some_and(|parts| parts < TILTED_PARTS) {
+            // It may be tilted: then it seems to turn unevenly, and parts of a turn tell another speed than whole ones.
+            let swing_rad_s = UNEVEN_SHARE * self.evidence.swing_rad_s.unwrap_or(0.0);
+            self.estimate.sigma_rad_s = root_sum_square(self.estimate.sigma_rad_s, swing_rad_s);
+        }
         let short = window.duration_us < BASE_WINDOW_US;
         let most = if short { MOST_SHORT_SIGMA } else { MOST_ERROR / COARSE_SIGMAS };
         let stretched = stretch > MOST_ERROR;
-        let own = self.estimate.sigma_rad_s;
-        let sigma_rad_s = sqrt(own * own + roll_rad_s * roll_rad_s);
+        let sigma_rad_s = root_sum_square(self.estimate.sigma_rad_s, roll_rad_s);
         let rough = sigma_rad_s > most * self.omega_rad_s.abs();
         if stretched || rough {
             let slow = !stretched && self.wanted_us > window.duration_us as f32;

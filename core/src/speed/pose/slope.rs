@@ -4,9 +4,9 @@ use heapless::Vec;
 
 use super::super::baseline::Estimate;
 use super::super::path::Knot;
-use super::super::statistics::student_over_normal;
+use super::super::statistics::{root_sum_square, student_over_normal};
 use super::super::trend::{Point, Trend};
-use super::{MOVING_PX_S, Pose, Sums};
+use super::{LEAST_SHARE, MOVING_PX_S, Pose, Sums};
 use crate::limits::MAX_KNOTS;
 use crate::math::{TAU, larger, sqrt};
 use crate::store::Window;
@@ -15,13 +15,19 @@ use crate::store::Window;
 const FOLDED_PERIODS: usize = 3;
 /// Blocks over which the wandering of the axis is judged.
 const DRIFT_BLOCKS: usize = 12;
-/// No rotor turns by this share of a cycle of its harmonic beyond an even turn from a block to the next: the path has slipped to another
-/// edge of the template. Blocks of the fewest events scatter by a tenth of a cycle.
-const SLIP_CYCLES: f32 = 0.4;
+/// No rotor's turn goes by this share of a cycle of its harmonic off where the two blocks before lead: the path has slipped to another edge
+/// of the template. Blocks of the fewest events scatter by a tenth of a cycle.
+const SLIP_CYCLES: f32 = 0.6;
+/// The same where blocks between are out of step, where it slips bit by bit; and by so many standard errors.
+const GAP_SLIP_CYCLES: f32 = 0.2;
+const GAP_SLIP_SIGMAS: f32 = 4.0;
 /// Shortest time that pixels take to settle where a stream begins: simulated ones of a bandwidth of 50 Hz take as long.
 const SETTLING_US: f32 = 10_000.0;
 /// The window is so many times as long at least, or all of it is believed.
 const LEAST_SETTLED: f32 = 4.0;
+/// How far the speed in what is left out goes off where a parabola leads, over how much it swings within the rest: at its ends a
+/// polynomial of degree three is five times as steep.
+const END_SWING: f32 = 5.0;
 /// What they tell meanwhile is not believed where the speed without it is as exact, but for this factor; or differs by so many of its
 /// standard errors, from a moving camera by so many.
 const AS_EXACT: f32 = 1.25;
@@ -47,13 +53,28 @@ pub struct Slope {
     pub unsettled_us: f32,
 }
 
-/// Whether the turn goes by `most_rad` beyond an even one from a block in step to the next.
-fn slips(points: &[Point], most_rad: f32) -> bool {
-    let seen = || points.iter().filter(|point| point.weight > 0.0);
-    let (Some(first), Some(last)) = (seen().next(), seen().next_back()) else { return false };
-    let even = (last.y - first.y) / larger(last.u - first.u, f32::MIN_POSITIVE);
-    let off = |(a, b): (&Point, &Point)| (b.y - a.y - even * (b.u - a.u)).abs();
-    seen().zip(seen().skip(1)).map(off).any(|off_rad| off_rad > most_rad)
+/// Whether the turn slips from one cycle of `cycle_rad` to another: goes off where two blocks in step lead to the next one. A `share` of
+/// their events is in step.
+fn slips(points: &[Point], cycle_rad: f32, share: f32) -> bool {
+    let mut before = [(0, Point::default()); 2];
+    for (last, c) in points.iter().enumerate().filter(|(_, point)| point.weight > 0.0) {
+        let [(first, a), (_, b)] = before;
+        before = [before[1], (last, *c)];
+        if a.weight <= 0.0 {
+            continue;
+        }
+        let lead = (c.u - b.u) / (b.u - a.u);
+        let off_cycles = (c.y - b.y - lead * (b.y - a.y)).abs() / cycle_rad;
+        // Phases of events scatter by 1 / (2 share) in square.
+        let ahead = 1.0 + lead;
+        let scatter = 1.0 / c.weight + ahead * ahead / b.weight + lead * lead / a.weight;
+        let sigma_cycles = sqrt(0.5 * scatter / share) / TAU;
+        let gap = last - first > 2 && off_cycles > GAP_SLIP_SIGMAS * sigma_cycles;
+        if off_cycles > if gap { GAP_SLIP_CYCLES } else { SLIP_CYCLES } {
+            return true;
+        }
+    }
+    false
 }
 
 impl Pose {
@@ -101,7 +122,8 @@ impl Pose {
             let u = (t_us - middle_us) / half_us;
             points.push(Point { u, y, weight: if u < -1.0 { 0.0 } else { weight } }).ok();
         }
-        if slips(&points, SLIP_CYCLES * TAU / self.harmonic as f32) {
+        let share = self.coherence.max(LEAST_SHARE);
+        if slips(&points, TAU / self.harmonic as f32, share) {
             return None;
         }
         // Blocks a period apart see the same pixels, unless the axis wanders: what tells more exactly.
@@ -115,16 +137,16 @@ impl Pose {
         let (half_s, middle_s) = (half_us * 1e-6, middle_us * 1e-6);
         let alpha_rad_s2 = trend.bend / (half_s * half_s);
         let alpha_sigma_rad_s2 = factor * trend.bend_error / (half_s * half_s);
-        let swing_rad_s = |bent: f32| 0.5 * TAU / half_s * sqrt(bent.max(0.0));
+        let swing_rad_s = |bent: f32| 0.5 * TAU / half_s * sqrt(bent);
         let beyond_rad_s = trend.slope / half_s - alpha_rad_s2 * middle_s;
         // What is left out may have had another acceleration, and a swing.
-        let error = factor * trend.slope_error / half_s;
-        let accelerated = alpha_sigma_rad_s2 * middle_s;
-        let swung = swing_rad_s(trend.bent_beside_bend()) * middle_us / half_us;
+        let error =
+            root_sum_square(factor * trend.slope_error / half_s, alpha_sigma_rad_s2 * middle_s);
+        let swung = END_SWING * swing_rad_s(trend.bent_beside) * middle_us / half_us;
         Some(Slope {
             speed: Estimate {
                 omega_rad_s: self.omega_rad_s + beyond_rad_s,
-                sigma_rad_s: sqrt(error * error + accelerated * accelerated + swung * swung),
+                sigma_rad_s: root_sum_square(error, swung),
             },
             beyond_rad_s,
             swing_rad_s: swing_rad_s(trend.bent),
@@ -162,26 +184,38 @@ impl Pose {
 mod tests {
     use super::*;
 
-    /// Turns of 40 blocks, every fifth not in step: `jump_rad` in the middle, and a scatter of a tenth of a cycle of the
-    /// harmonic 12 about a speed that changes.
-    fn points(jump_rad: f32) -> Vec<Point, MAX_KNOTS> {
+    /// Turns of 40 blocks, `gap` in the middle not in step: `jump_rad` over them, and a scatter of a share of a cycle of the harmonic
+    /// 12 about a speed that changes.
+    fn points(jump_rad: f32, gap: usize, scatter: f32) -> Vec<Point, MAX_KNOTS> {
         (0..40_usize)
             .map(|i| {
                 let u = (i as f32 - 19.5) / 20.0;
-                let scatter = 0.05 * ((i * 7 % 11) as f32 - 5.0) / 5.0;
-                let y = 0.8 * u + 0.1 * u * u + scatter + if i < 20 { 0.0 } else { jump_rad };
-                Point { u, y, weight: if i % 5 == 0 { 0.0 } else { 50.0 } }
+                let off = scatter * CYCLE_RAD * ((i * 7 % 11) as f32 - 5.0) / 5.0;
+                let y = 0.8 * u + 0.1 * u * u + off + if i < 20 { 0.0 } else { jump_rad };
+                Point { u, y, weight: if (20..20 + gap).contains(&i) { 0.0 } else { 50.0 } }
             })
             .collect()
     }
 
+    const CYCLE_RAD: f32 = TAU / 12.0;
+
     #[test]
     fn a_turn_by_a_cycle_of_the_harmonic_is_a_slip() {
-        let cycle_rad = TAU / 12.0;
-        for jump_rad in [cycle_rad, -cycle_rad] {
-            assert!(slips(&points(jump_rad), SLIP_CYCLES * cycle_rad));
+        for jump_rad in [CYCLE_RAD, -CYCLE_RAD] {
+            assert!(slips(&points(jump_rad, 0, 0.1), CYCLE_RAD, 0.9));
         }
-        assert!(!slips(&points(0.0), SLIP_CYCLES * cycle_rad));
-        assert!(!slips(&[], SLIP_CYCLES * cycle_rad));
+        assert!(!slips(&points(0.0, 0, 0.1), CYCLE_RAD, 0.9));
+        assert!(!slips(&[], CYCLE_RAD, 0.9));
+    }
+
+    #[test]
+    fn a_turn_by_part_of_a_cycle_while_blocks_are_out_of_step_is_a_slip() {
+        let part_rad = 0.4 * CYCLE_RAD;
+        assert!(slips(&points(part_rad, 2, 0.01), CYCLE_RAD, 0.9));
+        assert!(!slips(&points(0.0, 2, 0.01), CYCLE_RAD, 0.9));
+        assert!(
+            !slips(&points(part_rad, 0, 0.01), CYCLE_RAD, 0.9),
+            "they follow a motor that hunts"
+        );
     }
 }
