@@ -7,6 +7,8 @@
 //!
 //! The axis is held *fixed*: then a single mark on a disc is enough to see.
 
+use core::ops::Range;
+
 use heapless::Vec;
 
 use super::path::{Moving, Path};
@@ -109,8 +111,8 @@ impl Ladder {
             if self.size < LEAST_EVENTS {
                 return true;
             }
-            let mut events = self.placed(window, path);
-            (self.first_us, _) = take(&mut events, self.size, self.size, &mut icp.first);
+            let events = self.placed(window, path);
+            (self.first_us, _) = take(events, 0..self.size, self.size, &mut icp.first);
             self.passed = self.size;
         }
         self.level += 1;
@@ -120,9 +122,10 @@ impl Ladder {
     /// Cuts the later slice of the next level and starts its registration; `false` when the ladder ends.
     fn cut(&mut self, window: &Window<'_>, path: &Path, icp: &mut Icp) -> bool {
         let length = self.size.max((GROWTH * self.passed as f32) as usize);
-        let mut events = self.placed(window, path).skip(self.passed);
-        let (second_us, length_us) = take(&mut events, length, self.size, &mut icp.second);
+        let range = self.passed..self.passed + length;
         self.passed += length;
+        let events = self.placed(window, path);
+        let (second_us, length_us) = take(events, range, self.size, &mut icp.second);
         let baseline_s = (second_us - self.first_us) * 1e-6;
         let rate_so_far = if self.seen { self.rate.unwrap_or(0.0).abs() } else { 0.0 };
         if icp.second.len() < self.size / 2
@@ -154,17 +157,20 @@ impl Ladder {
     }
 }
 
-/// Moves the next `length` events, thinned to about `most`, into a slice; their mean time and their span in us.
+/// Moves a range of the events, thinned to about `most`, into a slice; their mean time and their span in us.
+// Not inlined: it is called twice.
+#[inline(never)]
 fn take(
-    events: &mut impl Iterator<Item = (i32, SlicePoint)>,
-    length: usize,
+    events: impl Iterator<Item = (i32, SlicePoint)>,
+    range: Range<usize>,
     most: usize,
     slice: &mut Slice,
 ) -> (f32, f32) {
     slice.clear();
     let (mut sum_us, mut from_us, mut to_us) = (0.0_f32, None, 0);
     let mut next = 0;
-    for (index, (t_us, point)) in events.take(length).enumerate() {
+    let length = range.len();
+    for (index, (t_us, point)) in events.skip(range.start).take(length).enumerate() {
         if index * most >= next {
             next += length;
             slice.push(point).ok();

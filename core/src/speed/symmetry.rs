@@ -86,7 +86,12 @@ pub fn symmetry(angular: &AngularSums) -> Symmetry {
     let best = scores.iter().copied().fold(0.0, f32::max);
     let events: u32 = angular.counts.iter().take(2 * RINGS).sum();
     let least = LEAST_SCORE / sqrt(events.min(MOST_CHANCE) as f32);
-    let parts = (2..=MOST_PARTS).rev().find(|n| scores[*n] >= CLOSE_TO_BEST * best).unwrap_or(1);
+    let mut parts = 1;
+    for (number, score) in scores.iter().enumerate().skip(2) {
+        if *score >= CLOSE_TO_BEST * best {
+            parts = number;
+        }
+    }
     let mean_peak =
         (1..parts).map(|i| at(i as f32 / parts as f32)).sum::<f32>() / (parts - 1).max(1) as f32;
     let known = parts <= usize::from(MAX_BLADES);

@@ -124,6 +124,8 @@ impl Extraction {
         }
     }
 
+    // Not inlined: flash is short.
+    #[inline(never)]
     pub(super) fn collect(&mut self, scratch: &mut Scratch) {
         let disc = self.disc;
         let mine = |p: &Phasor| {

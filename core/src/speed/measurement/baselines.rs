@@ -4,6 +4,7 @@ use super::super::baseline::{Effort, Estimate, Pace, Pairs};
 use super::coarse::COARSE_AGREEMENT;
 use super::verdict::LOCK_AGREEMENT;
 use super::{Measurement, Stage};
+use crate::speed::pose::Slope;
 use crate::limits::SLICE_POINTS;
 use crate::reading::Reason;
 use crate::registration::Icp;
@@ -60,20 +61,26 @@ impl Measurement {
         self.pairs = Some(plan);
     }
 
-    /// Plans pairs of the lock, behind what is not believed. Where the speed swings, or they lie so, their yaws are made those of the
-    /// window's mean speed wherever in the window they lie. By less than witnesses may differ it does not matter, and a path that went
-    /// astray, as in a hand, would bear itself out: there they lie all over the window, and a steady acceleration cancels.
+    /// The slope whose path the lock's yaws are brought to: where the speed swings, or what the window begins with is not believed. By
+    /// less than witnesses may differ it does not matter, and a path that went astray, as in a hand, would bear itself out.
+    // Not inlined: it is called in four places.
+    #[inline(never)]
+    pub(super) fn leading(&self) -> Option<&Slope> {
+        let least_rad_s = LOCK_AGREEMENT * self.omega_rad_s.abs();
+        let leads = |slope: &&Slope| slope.swing_rad_s > least_rad_s || slope.unsettled_us > 0.0;
+        self.pose.slope().filter(leads).filter(|_| !self.moves())
+    }
+
+    /// Plans pairs of the lock. Where a slope leads, they lie behind what is not believed, and their yaws are made those of the window's
+    /// mean speed wherever in the window they lie. Elsewhere they lie all over the window, and a steady acceleration cancels.
     // Not inlined: it is called in three places.
     #[inline(never)]
     fn plan_lock_pairs(&mut self, window: &Window<'_>, periods: f32, effort: Effort) {
         self.plan(window, periods, effort);
-        let least_rad_s = LOCK_AGREEMENT * self.omega_rad_s.abs();
-        let moves = self.moves();
-        if let (Some(pairs), Some(slope), false) = (&mut self.pairs, self.pose.slope(), moves)
-            && (slope.swing_rad_s > least_rad_s || slope.unsettled_us > 0.0)
-        {
-            pairs.settle(slope.unsettled_us, window.duration_us as f32);
-            pairs.along(slope.beyond_rad_s);
+        let leading = self.leading().map(|slope| (slope.unsettled_us, slope.beyond_rad_s));
+        if let (Some(pairs), Some((unsettled_us, beyond_rad_s))) = (&mut self.pairs, leading) {
+            pairs.settle(unsettled_us, window.duration_us as f32);
+            pairs.along(beyond_rad_s);
         }
     }
 

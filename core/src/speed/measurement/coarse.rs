@@ -189,6 +189,8 @@ impl Measurement {
     }
 
     /// Initial alignment in every other segment: second coarse witness.
+    // Not inlined: flash is short.
+    #[inline(never)]
     pub(super) fn initial(&mut self, window: &Window<'_>, icp: &mut Icp) {
         if let Some(ladder) = &mut self.ladder {
             if ladder.step(window, &Path::STILL, icp) {

@@ -48,7 +48,7 @@ const REFINED_RIVAL_SIGMAS: f32 = 1.0;
 const ASTRAY_SIGMAS: f32 = 4.0;
 /// A lock with a larger relative error is only coarse.
 const MOST_LOCK_SIGMA: f32 = 3e-3;
-/// Relative error to which a lock is believed whatever the phase's is.
+/// Relative error to which a lock that does not go along the phase's path is believed whatever the phase's is.
 const OWN_SIGMA: f32 = 1e-3;
 /// Correlation of the witnesses' errors, as seen where both are known: the lock registers a part of the events that the phase is
 /// followed by.
@@ -109,8 +109,9 @@ impl Measurement {
         if let (Some(lock), Some(phase)) = (lock, phase) {
             // The phase follows all the events that the lock registers some of, and shows how the speed changed meanwhile, which the
             // lock's scatter does not: the lock is no surer. But a path that goes astray where half the window shows no rotor says
-            // nothing against it.
-            let least = phase.sigma_rad_s.min(OWN_SIGMA * lock.omega_rad_s.abs());
+            // nothing against a lock that does not go along it.
+            let own = if self.leading().is_some() { 1.0 } else { OWN_SIGMA };
+            let least = phase.sigma_rad_s.min(own * lock.omega_rad_s.abs());
             let witness = Estimate { sigma_rad_s: lock.sigma_rad_s.max(least), ..lock };
             let both = combine(witness, phase, 1.0);
             let sharp = both.sigma_rad_s.max(held_up * both.omega_rad_s.abs())
