@@ -4,10 +4,10 @@ use super::super::baseline::{Effort, Estimate, Pace, Pairs};
 use super::coarse::COARSE_AGREEMENT;
 use super::verdict::LOCK_AGREEMENT;
 use super::{Measurement, Stage};
-use crate::speed::pose::Slope;
 use crate::limits::SLICE_POINTS;
 use crate::reading::Reason;
 use crate::registration::Icp;
+use crate::speed::pose::Slope;
 use crate::store::Window;
 
 /// Slice pairs: refinement, lock, fractional-baseline test.

@@ -139,10 +139,11 @@ impl Pose {
         let alpha_sigma_rad_s2 = factor * trend.bend_error / (half_s * half_s);
         let swing_rad_s = |bent: f32| 0.5 * TAU / half_s * sqrt(bent);
         let beyond_rad_s = trend.slope / half_s - alpha_rad_s2 * middle_s;
-        // What is left out may have had another acceleration, and a swing.
+        // What is left out may have had another acceleration, and a swing, as may the ends where no block is in step.
         let error =
             root_sum_square(factor * trend.slope_error / half_s, alpha_sigma_rad_s2 * middle_s);
-        let swung = END_SWING * swing_rad_s(trend.bent_beside) * middle_us / half_us;
+        let untold = middle_us / half_us + self.ends_untold(&points, half_us);
+        let swung = END_SWING * swing_rad_s(trend.bent_beside) * untold;
         Some(Slope {
             speed: Estimate {
                 omega_rad_s: self.omega_rad_s + beyond_rad_s,
@@ -155,6 +156,16 @@ impl Pose {
             drift_px_s: self.drift_px_s(),
             unsettled_us,
         })
+    }
+
+    /// Share of the window at its two ends where no block tells.
+    fn ends_untold(&self, points: &[Point], half_us: f32) -> f32 {
+        let (mut before, mut after) = (-1.0, -1.0);
+        for point in points.iter().filter(|point| point.weight > 0.0) {
+            before = larger(before, -point.u);
+            after = larger(after, point.u);
+        }
+        larger(0.5 * (2.0 - before - after - self.path.step_us() / half_us), 0.0)
     }
 
     /// Root mean square speed of the axis along the path, in px/s.
