@@ -63,7 +63,7 @@ impl Measurement {
 
     /// The slope whose path the lock's yaws are brought to: where the speed swings, or what the window begins with is not believed. By
     /// less than witnesses may differ it does not matter, and a path that went astray, as in a hand, would bear itself out.
-    // Not inlined: it is called in four places.
+    // Not inlined: it is called twice.
     #[inline(never)]
     pub(super) fn leading(&self) -> Option<&Slope> {
         let least_rad_s = LOCK_AGREEMENT * self.omega_rad_s.abs();
