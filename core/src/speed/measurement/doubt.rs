@@ -177,11 +177,14 @@ fn keep(polar: &mut PolarTrack, moment: bool) {
 }
 
 impl Measurement {
-    /// Whether another harmonic keeps step almost as well wherever the centre is thought to be, and no overtone settles it.
+    /// Whether another harmonic keeps step almost as well wherever the centre is thought to be, and no overtone settles it: none does
+    /// where a centre that is off by little leads from one to the next.
     pub(super) fn in_doubt(&self) -> bool {
         let settled = self.pose.has_overtone() && self.disc.radius_px >= SMALL_PX;
-        let rivalled = |doubt: &Doubt| doubt.rival_share > MOST_RIVAL * doubt.share;
-        !settled && (self.standing() > IN_DOUBT || self.doubt.as_ref().is_some_and(rivalled))
+        let rivalled = |doubt: &Doubt| {
+            (doubt.small || !settled) && doubt.rival_share > MOST_RIVAL * doubt.share
+        };
+        !settled && self.standing() > IN_DOUBT || self.doubt.as_ref().is_some_and(rivalled)
     }
 
     /// Whether the centre is to be looked about, as another harmonic keeps step too.
