@@ -27,18 +27,20 @@ const QUEUE_EVENTS: f32 = 4_096.0;
 
 /// Share of a rotor's events that come, from which on it is not sure that any are lost.
 const MOST_CAME: f32 = 0.6;
-/// Events that a blade leaves in a pixel as it passes, at least: one or two, of both polarities, and a mark on a disc, which passes
-/// half of it, half as many.
+/// Events of either polarity that a blade leaves in a pixel as it passes, at least: one, and a mark on a disc, which passes half of
+/// it, half as many.
 const LEAST_LEFT: f32 = 0.5;
-/// A line through times of which the first share x is early by the share y of all is tilted by 6 x y at most.
-const TILT: f32 = 6.0;
+/// A line through times of which the first are early, by the share y of all at the start and evenly less up to the share x, is tilted
+/// by 3 x y at most.
+const TILT: f32 = 3.0;
 
 /// Share by which the time of the window may be stretched as a rotor's speed is read: 0 unless the readout was busy all through
-/// it. The rotor's blades pass so many times. Cost: 20 000 instructions, and one pass over the window where it was.
+/// it. At least so many blades of the rotor pass meanwhile. Cost: 20 000 instructions, and one pass over the window where it was.
 #[must_use]
-pub fn stretch(window: &Window<'_>, disc: Disc, periods: Option<f32>) -> f32 {
+pub fn stretch(window: &Window<'_>, disc: Disc, passes: f32) -> f32 {
     let (mut scatter, mut degrees) = (0.0, 0_u32);
-    for segment in 0..window.segments() {
+    // A stream begins with an empty queue, so its first moments are not busy yet.
+    for segment in usize::from(window.segments() > 1)..window.segments() {
         let (found, groups) = paces(window, segment);
         scatter += found;
         degrees += groups;
@@ -46,20 +48,21 @@ pub fn stretch(window: &Window<'_>, disc: Disc, periods: Option<f32>) -> f32 {
     if degrees < LEAST_GROUPS || scatter > MOST_SCATTER * degrees as f32 {
         return 0.0;
     }
-    let (mut arrived, mut of_rotor) = (0.0, 0.0);
+    let (mut arrived, mut of_rotor) = (0.0, [0.0_f32; 2]);
     for event in window.events() {
         let stands_for = f32::from(1_u16 << event.weight_log2());
         let at = Disc { x_px: event.x().into(), y_px: event.y().into(), radius_px: 0.0 };
         arrived += stands_for;
         if disc.distance2(&at) < disc.radius_px * disc.radius_px {
-            of_rotor += stands_for;
+            of_rotor[usize::from(window.is_on(event))] += stands_for;
         }
     }
     let whole = QUEUE_EVENTS / larger(arrived, QUEUE_EVENTS);
-    let seen = core::f32::consts::PI * disc.radius_px * disc.radius_px * periods.unwrap_or(0.0);
+    let [off, on] = of_rotor;
+    let seen = core::f32::consts::PI * disc.radius_px * disc.radius_px * passes;
     // Of so many that the pixels sent, these came: what is lost beside one that comes fills the queue, or would.
-    let came = of_rotor / larger(LEAST_LEFT * seen, of_rotor);
-    let filled = whole * (came / larger(1.0 - came, f32::MIN_POSITIVE)).min(1.0);
+    let came = larger(off, on) / larger(LEAST_LEFT * seen, larger(off, on));
+    let filled = whole * came / larger(1.0 - came, f32::MIN_POSITIVE);
     if came < MOST_CAME { (TILT * filled * whole).min(whole) } else { whole }
 }
 
@@ -93,11 +96,16 @@ mod tests {
 
     /// The stretch of a window of events whose distances are told in nanoseconds.
     fn of(distance_ns: impl Fn(u64) -> u64) -> f32 {
-        around(Disc::default(), None, distance_ns)
+        around(Disc::default(), 0.0, &[Polarity::On], distance_ns)
     }
 
-    /// The same as a rotor's speed is read.
-    fn around(disc: Disc, periods: Option<f32>, distance_ns: impl Fn(u64) -> u64) -> f32 {
+    /// The same as a rotor's speed is read, of events of these polarities.
+    fn around(
+        disc: Disc,
+        passes: f32,
+        polarities: &[Polarity],
+        distance_ns: impl Fn(u64) -> u64,
+    ) -> f32 {
         let mut memory = vec![StoredEvent::default(); MOST_SEGMENTS * 2_048];
         let mut store = Store::new(&mut memory, MOST_SPARE, 25_000);
         let mut t_ns = 0;
@@ -110,9 +118,11 @@ mod tests {
             while t_us >= store.open_end_us() {
                 store.close_segment();
             }
-            store.push(&[PackedEvent::new(t_us as u32, 1, 1, Polarity::On)], 0, |_, _| {});
+            // Not in turn: a store that thins might keep one of them only.
+            let polarity = polarities[(random(index) * 1e6) as usize % polarities.len()];
+            store.push(&[PackedEvent::new(t_us as u32, 1, 1, polarity)], 0, |_, _| {});
         }
-        stretch(&store.window(6, u64::MAX), disc, periods)
+        stretch(&store.window(6, u64::MAX), disc, passes)
     }
 
     /// Exponentially distributed with a mean of one, from a hash.
@@ -132,6 +142,13 @@ mod tests {
     }
 
     #[test]
+    fn a_readout_that_is_busy_once_the_stream_has_begun_is_told() {
+        let burst = |index| (random(index) * random(index + (1 << 32)) * 1_000.0) as u64;
+        assert!(of(|index| if index < 25_000 { burst(index) } else { 1_000 }) > 0.0);
+        assert!(of(|index| if index < 50_000 { burst(index) } else { 1_000 }) == 0.0);
+    }
+
+    #[test]
     fn the_stretch_is_the_queue_over_the_events() {
         let found = of(|_| 1_000);
         assert!((found / (4_096.0 / 150_000.0) - 1.0).abs() < 0.05, "{found}");
@@ -142,12 +159,15 @@ mod tests {
         // All events within 314 pixels, which see 500 or 5 000 blades pass.
         let disc = Disc { x_px: 1.0, y_px: 1.0, radius_px: 10.0 };
         let whole = 4_096.0 / 150_000.0;
-        let complete = around(disc, Some(500.0), |_| 1_000);
+        let (one, both) = ([Polarity::On], [Polarity::On, Polarity::Off]);
+        let complete = around(disc, 500.0, &one, |_| 1_000);
         assert!((complete / whole - 1.0).abs() < 0.05, "{complete}");
-        let lost = around(disc, Some(5_000.0), |_| 1_000);
-        // 150 000 of 785 000 came, so the queue was full by the time that a quarter of what it holds had come.
-        let came = 150_000.0 / (0.5 * core::f32::consts::PI * 100.0 * 5_000.0);
-        let filled = whole * came / (1.0 - came);
-        assert!((lost / (6.0 * filled * whole) - 1.0).abs() < 0.1, "{lost}");
+        for (polarities, of_polarity) in [(&one[..], 150_000.0), (&both, 75_000.0)] {
+            let lost = around(disc, 5_000.0, polarities, |_| 1_000);
+            // So many of 785 000 came, so the queue was full by the time that a quarter, or a tenth, of what it holds had come.
+            let came = of_polarity / (0.5 * core::f32::consts::PI * 100.0 * 5_000.0);
+            let filled = whole * came / (1.0 - came);
+            assert!((lost / (3.0 * filled * whole) - 1.0).abs() < 0.1, "{lost}");
+        }
     }
 }

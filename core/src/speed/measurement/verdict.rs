@@ -103,7 +103,10 @@ impl Measurement {
         let phase = witness(self.evidence.phase_rad_s, self.evidence.phase_sigma_rad_s)
             .filter(|phase| phase.sigma_rad_s < MOST_ERROR * phase.omega_rad_s.abs());
         let window_s = window.duration_us as f32 * 1e-6;
-        let held_up = QUEUE_SIGMA * stretch(window, self.disc, self.evidence.periods);
+        // Parts that differ may be miscounted: at least one blade passes in a turn.
+        let parts = self.parts.filter(|_| self.alike).unwrap_or(1);
+        let passes = f32::from(parts) * self.omega_rad_s.abs() * window_s / TAU;
+        let held_up = QUEUE_SIGMA * stretch(window, self.disc, passes);
         // What jitter leads astray says nothing.
         let lock = lock.filter(|lock| self.registers() || self.bears_out(*lock, phase));
         if let (Some(lock), Some(phase)) = (lock, phase) {
@@ -117,7 +120,8 @@ impl Measurement {
             let sharp = both.sigma_rad_s.max(held_up * both.omega_rad_s.abs())
                 < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
             let long = self.wanted_us <= 1.02 * window.duration_us as f32;
-            if !self.bears_out(lock, Some(phase)) || self.refinement_denies(phase.omega_rad_s) {
+            let denied = self.registers() && self.refinement_denies(phase.omega_rad_s);
+            if denied || !self.bears_out(lock, Some(phase)) {
                 self.status = Status::Refused(Reason::Ambiguous);
             } else if sharp && long {
                 self.estimate = combine(witness, phase, USUAL_SIGMAS);
