@@ -13,8 +13,8 @@ use crate::store::{StoredEvent, Window};
 
 /// Events whose time is taken together: few against those of one edge that crosses a pixel, many against the microsecond.
 const GROUP: usize = 32;
-/// Most groups of a segment.
-const MOST_GROUPS: usize = 16;
+/// Most events of a place, 16 groups.
+const EVENTS: usize = 16 * GROUP + 1;
 /// Fewest groups that are judged.
 const LEAST_GROUPS: u32 = 8;
 /// Variance of the difference of two times rounded to the microsecond.
@@ -22,6 +22,8 @@ const ROUNDING_US2: f32 = 1.0 / 6.0;
 /// Scatter below which events come from a queue, as a share of that of a Poisson process: scenes that are not held up stay
 /// above a third.
 const MOST_SCATTER: f32 = 0.2;
+/// The same where one place alone is judged.
+const LEAST_SCATTER: f32 = 0.05;
 /// Events that a readout may hold.
 const QUEUE_EVENTS: f32 = 4_096.0;
 
@@ -33,19 +35,31 @@ const LEAST_LEFT: f32 = 0.5;
 /// A line through times of which the first are early, by the share y of all at the start and evenly less up to the share x, is tilted
 /// by 3 x y at most.
 const TILT: f32 = 3.0;
+/// The same where the queue is full from any time on, or up to any, or between any two: by 1.5 y.
+const STEP: f32 = 1.5;
 
-/// Share by which the time of the window may be stretched as a rotor's speed is read: 0 unless the readout was busy all through
-/// it. At least so many blades of the rotor pass meanwhile. Cost: 20 000 instructions, and one pass over the window where it was.
+/// Share by which the time of the window may be stretched as a rotor's speed is read: 0 unless the readout was busy in it. At least so
+/// many blades of the rotor pass meanwhile. Cost: 25 000 instructions, and one pass over the window where it was.
 #[must_use]
 pub fn stretch(window: &Window<'_>, disc: Disc, passes: f32) -> f32 {
     let (mut scatter, mut degrees) = (0.0, 0_u32);
-    // A stream begins with an empty queue, so its first moments are not busy yet.
-    for segment in usize::from(window.segments() > 1)..window.segments() {
-        let (found, groups) = paces(window, segment);
-        scatter += found;
-        degrees += groups;
+    let (mut busy, mut idle) = (false, false);
+    // Where segments start, and where the last ends.
+    for place in 0..=window.segments() {
+        let end = place == window.segments();
+        let (found, groups) = paces(window, window.segment(place - usize::from(end)), end);
+        let judged = groups >= LEAST_GROUPS;
+        busy |= judged && found < LEAST_SCATTER * groups as f32;
+        // A stream begins with an empty queue, so its first moments are not busy yet.
+        if place > 0 || window.segments() == 1 {
+            idle |= judged && found > MOST_SCATTER * groups as f32;
+            scatter += found;
+            degrees += groups;
+        }
     }
-    if degrees < LEAST_GROUPS || scatter > MOST_SCATTER * degrees as f32 {
+    let all_through = degrees >= LEAST_GROUPS && scatter < MOST_SCATTER * degrees as f32;
+    let for_a_while = busy && idle;
+    if !all_through && !for_a_while {
         return 0.0;
     }
     let (mut arrived, mut of_rotor) = (0.0, [0.0_f32; 2]);
@@ -58,6 +72,9 @@ pub fn stretch(window: &Window<'_>, disc: Disc, passes: f32) -> f32 {
         }
     }
     let whole = QUEUE_EVENTS / larger(arrived, QUEUE_EVENTS);
+    if for_a_while {
+        return STEP * whole;
+    }
     let [off, on] = of_rotor;
     let seen = core::f32::consts::PI * disc.radius_px * disc.radius_px * passes;
     // Of so many that the pixels sent, these came: what is lost beside one that comes fills the queue, or would.
@@ -66,18 +83,22 @@ pub fn stretch(window: &Window<'_>, disc: Disc, passes: f32) -> f32 {
     if came < MOST_CAME { (TILT * filled * whole).min(whole) } else { whole }
 }
 
-/// Variance of the time that a group takes over that of a Poisson process, times the degrees of freedom, and these.
-fn paces(window: &Window<'_>, segment: usize) -> (f32, u32) {
-    let events = window.segment(segment);
-    let consecutive = events.iter().take_while(|event| event.weight_log2() == 0).count();
-    let events = &events[..consecutive.min(GROUP * MOST_GROUPS + 1)];
+/// Variance of the time that a group of events takes over that of a Poisson process, times the degrees of freedom, and these: of the
+/// first events, or the last, that all stand for as many.
+fn paces(window: &Window<'_>, events: &[StoredEvent], last: bool) -> (f32, u32) {
+    let count = events.len().min(EVENTS);
+    let events = if last { &events[events.len() - count..] } else { &events[..count] };
+    let weight = |event: &StoredEvent| event.weight_log2();
+    let alike = if last { events.last() } else { events.first() }.map_or(0, weight);
     let since = |event: &StoredEvent| event.since(window.start_us) as f32;
     let (mut sum, mut squares, mut count) = (0.0, 0.0, 0_u32);
     for (early, late) in events.iter().zip(events.iter().skip(GROUP)).step_by(GROUP) {
-        let time_us = since(late) - since(early);
-        sum += time_us;
-        squares += time_us * time_us;
-        count += 1;
+        if weight(early) == alike && weight(late) == alike {
+            let time_us = since(late) - since(early);
+            sum += time_us;
+            squares += time_us * time_us;
+            count += 1;
+        }
     }
     let mean = sum / (count as f32).max(1.0);
     if count < 2 || mean <= 0.0 {
@@ -85,7 +106,8 @@ fn paces(window: &Window<'_>, segment: usize) -> (f32, u32) {
     }
     let degrees = count - 1;
     let variance_us2 = squares - mean * sum - ROUNDING_US2 * degrees as f32;
-    (variance_us2.max(0.0) * GROUP as f32 / (mean * mean), degrees)
+    let of_random_us2 = mean * mean / ((GROUP << alike) as f32);
+    (variance_us2.max(0.0) / of_random_us2, degrees)
 }
 
 #[cfg(test)]
@@ -93,6 +115,9 @@ mod tests {
     use super::*;
     use crate::event::{PackedEvent, Polarity};
     use crate::store::{MOST_SEGMENTS, MOST_SPARE, Store};
+
+    /// Share of the events of a window, one in a microsecond, that the queue holds.
+    const WHOLE: f32 = 4_096.0 / 150_000.0;
 
     /// The stretch of a window of events whose distances are told in nanoseconds.
     fn of(distance_ns: impl Fn(u64) -> u64) -> f32 {
@@ -133,6 +158,11 @@ mod tests {
         -libm::logf((hash as f32 + 0.5) / (1 << 24) as f32)
     }
 
+    /// Distance in ns of events that come in bursts, one in a microsecond in the mean.
+    fn burst(index: u64) -> u64 {
+        (random(index) * random(index + (1 << 32)) * 1_000.0) as u64
+    }
+
     #[test]
     fn a_clocked_readout_is_told_from_random_events_at_any_pace() {
         for pace_ns in [200, 1_000, 20_000] {
@@ -143,31 +173,37 @@ mod tests {
 
     #[test]
     fn a_readout_that_is_busy_once_the_stream_has_begun_is_told() {
-        let burst = |index| (random(index) * random(index + (1 << 32)) * 1_000.0) as u64;
-        assert!(of(|index| if index < 25_000 { burst(index) } else { 1_000 }) > 0.0);
-        assert!(of(|index| if index < 50_000 { burst(index) } else { 1_000 }) == 0.0);
+        let found = of(|index| if index < 25_000 { burst(index) } else { 1_000 });
+        assert!((found / WHOLE - 1.0).abs() < 0.05, "{found}");
+    }
+
+    #[test]
+    fn a_readout_that_is_busy_for_a_while_may_stretch_half_as_much_again() {
+        for busy in [0..45_000, 60_000..100_000, 130_000..200_000] {
+            let found = of(|index| if busy.contains(&index) { 1_000 } else { burst(index) });
+            assert!((found / (1.5 * WHOLE) - 1.0).abs() < 0.05, "{busy:?}: {found}");
+        }
     }
 
     #[test]
     fn the_stretch_is_the_queue_over_the_events() {
         let found = of(|_| 1_000);
-        assert!((found / (4_096.0 / 150_000.0) - 1.0).abs() < 0.05, "{found}");
+        assert!((found / WHOLE - 1.0).abs() < 0.05, "{found}");
     }
 
     #[test]
     fn where_pixels_miss_most_blades_the_queue_filled_at_once() {
         // All events within 314 pixels, which see 500 or 5 000 blades pass.
         let disc = Disc { x_px: 1.0, y_px: 1.0, radius_px: 10.0 };
-        let whole = 4_096.0 / 150_000.0;
         let (one, both) = ([Polarity::On], [Polarity::On, Polarity::Off]);
         let complete = around(disc, 500.0, &one, |_| 1_000);
-        assert!((complete / whole - 1.0).abs() < 0.05, "{complete}");
+        assert!((complete / WHOLE - 1.0).abs() < 0.05, "{complete}");
         for (polarities, of_polarity) in [(&one[..], 150_000.0), (&both, 75_000.0)] {
             let lost = around(disc, 5_000.0, polarities, |_| 1_000);
             // So many of 785 000 came, so the queue was full by the time that a quarter, or a tenth, of what it holds had come.
             let came = of_polarity / (0.5 * core::f32::consts::PI * 100.0 * 5_000.0);
-            let filled = whole * came / (1.0 - came);
-            assert!((lost / (3.0 * filled * whole) - 1.0).abs() < 0.1, "{lost}");
+            let filled = WHOLE * came / (1.0 - came);
+            assert!((lost / (3.0 * filled * WHOLE) - 1.0).abs() < 0.1, "{lost}");
         }
     }
 }
