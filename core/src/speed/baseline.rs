@@ -23,6 +23,10 @@ const SLICE_PERIODS: f32 = 0.25;
 const SLICE_EVENTS: f32 = 400.0;
 /// Most periods folded into a slice.
 const MOST_FOLDS: u32 = 32;
+/// Fewest pairs of folded slices, even where fewer lie side by side; no more than are asked for.
+const LEAST_PAIRS: u32 = 4;
+/// Share of its noise within which a registration of folded slices is settled.
+const FOLDED_SETTLED: f32 = 0.3;
 
 /// How much work goes into slice pairs.
 #[derive(Clone, Copy, Debug)]
@@ -97,13 +101,19 @@ impl Pairs {
         let room = (window_us as f32 / period_us - periods - SLICE_PERIODS).max(0.0);
         let folds = (SLICE_EVENTS / in_slice.max(1.0)) as u32;
         let folds = folds.clamp(1, MOST_FOLDS).min(1 + (0.5 * room) as u32);
-        let pairs = effort.pairs.min(MAX_PAIRS as u32);
         let span = folds as f32 - 1.0 + SLICE_PERIODS;
-        let independent = (1.0 + room / span).min(pairs as f32);
+        let independent = 1.0 + room / span;
+        let mut effort = Effort { pairs: effort.pairs.min(MAX_PAIRS as u32), ..effort };
+        if folds > 1 {
+            // More pairs than lie side by side look at the same events again.
+            effort.pairs = effort.pairs.min((independent as u32).max(LEAST_PAIRS));
+            effort.settled = effort.settled.max(FOLDED_SETTLED);
+        }
+        let independent = independent.min(effort.pairs as f32);
         Self {
             pace,
             periods,
-            effort: Effort { pairs, ..effort },
+            effort,
             next: 0,
             folds,
             registering: false,
