@@ -45,9 +45,9 @@ pub fn stretch(window: &Window<'_>, disc: Disc, passes: f32) -> f32 {
     let (mut scatter, mut degrees) = (0.0, 0_u32);
     let (mut busy, mut idle) = (false, false);
     // Where segments start, and where the last ends.
+    let last = window.segments().saturating_sub(1);
     for place in 0..=window.segments() {
-        let end = place == window.segments();
-        let (found, groups) = paces(window, window.segment(place - usize::from(end)), end);
+        let (found, groups) = paces(window, window.segment(place.min(last)), place > last);
         let judged = groups >= LEAST_GROUPS;
         busy |= judged && found < LEAST_SCATTER * groups as f32;
         // A stream begins with an empty queue, so its first moments are not busy yet.
