@@ -84,17 +84,15 @@ pub fn stretch(window: &Window<'_>, disc: Disc, passes: f32) -> f32 {
 }
 
 /// Variance of the time that a group of events takes over that of a Poisson process, times the degrees of freedom, and these: of the
-/// first events, or the last, that all stand for as many.
+/// first events or the last, as they came. Thinned ones stand for so many that edges pass the pixels evenly meanwhile.
 fn paces(window: &Window<'_>, events: &[StoredEvent], last: bool) -> (f32, u32) {
     let count = events.len().min(EVENTS);
     let events = if last { &events[events.len() - count..] } else { &events[..count] };
-    let weight = |event: &StoredEvent| event.weight_log2();
-    let alike = if last { events.last() } else { events.first() }.map_or(0, weight);
     let since = |event: &StoredEvent| event.since(window.start_us) as f32;
     let (mut sum, mut squares, mut count) = (0.0, 0.0, 0_u32);
-    for (early, late) in events.iter().zip(events.iter().skip(GROUP)).step_by(GROUP) {
-        if weight(early) == alike && weight(late) == alike {
-            let time_us = since(late) - since(early);
+    for group in events.windows(GROUP + 1).step_by(GROUP) {
+        if group.iter().all(|event| event.weight_log2() == 0) {
+            let time_us = since(&group[GROUP]) - since(&group[0]);
             sum += time_us;
             squares += time_us * time_us;
             count += 1;
@@ -106,8 +104,7 @@ fn paces(window: &Window<'_>, events: &[StoredEvent], last: bool) -> (f32, u32) 
     }
     let degrees = count - 1;
     let variance_us2 = squares - mean * sum - ROUNDING_US2 * degrees as f32;
-    let of_random_us2 = mean * mean / ((GROUP << alike) as f32);
-    (variance_us2.max(0.0) / of_random_us2, degrees)
+    (variance_us2.max(0.0) * GROUP as f32 / (mean * mean), degrees)
 }
 
 #[cfg(test)]
@@ -121,17 +118,18 @@ mod tests {
 
     /// The stretch of a window of events whose distances are told in nanoseconds.
     fn of(distance_ns: impl Fn(u64) -> u64) -> f32 {
-        around(Disc::default(), 0.0, &[Polarity::On], distance_ns)
+        around(32_768, Disc::default(), 0.0, &[Polarity::On], distance_ns)
     }
 
-    /// The same as a rotor's speed is read, of events of these polarities.
+    /// The same as a rotor's speed is read, of events of these polarities, in room for so many in a segment.
     fn around(
+        capacity: usize,
         disc: Disc,
         passes: f32,
         polarities: &[Polarity],
         distance_ns: impl Fn(u64) -> u64,
     ) -> f32 {
-        let mut memory = vec![StoredEvent::default(); MOST_SEGMENTS * 2_048];
+        let mut memory = vec![StoredEvent::default(); MOST_SEGMENTS * capacity];
         let mut store = Store::new(&mut memory, MOST_SPARE, 25_000);
         let mut t_ns = 0;
         for index in 0_u64.. {
@@ -186,6 +184,13 @@ mod tests {
     }
 
     #[test]
+    fn an_edge_that_passes_pixels_evenly_is_no_busy_readout() {
+        // Of a pattern that comes again every 512 events, 32 that stand for 16 each take the same time always.
+        let evenly = |index| burst(index % 512);
+        assert!(around(2_048, Disc::default(), 0.0, &[Polarity::On], evenly) == 0.0);
+    }
+
+    #[test]
     fn the_stretch_is_the_queue_over_the_events() {
         let found = of(|_| 1_000);
         assert!((found / WHOLE - 1.0).abs() < 0.05, "{found}");
@@ -196,10 +201,10 @@ mod tests {
         // All events within 314 pixels, which see 500 or 5 000 blades pass.
         let disc = Disc { x_px: 1.0, y_px: 1.0, radius_px: 10.0 };
         let (one, both) = ([Polarity::On], [Polarity::On, Polarity::Off]);
-        let complete = around(disc, 500.0, &one, |_| 1_000);
+        let complete = around(32_768, disc, 500.0, &one, |_| 1_000);
         assert!((complete / WHOLE - 1.0).abs() < 0.05, "{complete}");
         for (polarities, of_polarity) in [(&one[..], 150_000.0), (&both, 75_000.0)] {
-            let lost = around(disc, 5_000.0, polarities, |_| 1_000);
+            let lost = around(2_048, disc, 5_000.0, polarities, |_| 1_000);
             // So many of 785 000 came, so the queue was full by the time that a quarter, or a tenth, of what it holds had come.
             let came = of_polarity / (0.5 * core::f32::consts::PI * 100.0 * 5_000.0);
             let filled = WHOLE * came / (1.0 - came);
