@@ -245,7 +245,7 @@ fn the_rhythm_of_pushing_and_polling_changes_no_bit() {
 #[test]
 fn a_measurement_that_lasts_long_leaves_all_that_came_meanwhile_to_the_next() {
     const RPM: f64 = 1500.0;
-    for piece_events in [512, 1_024, 4_096] {
+    for piece_events in [1_024, 2_048, 4_096] {
         let rotor =
             Rotor { rpm: RPM, x_px: 110.0, y_px: 95.0, radius_px: 45.0, ..Rotor::default() };
         let (width_px, height_px, rotors) = (WIDTH_PX, HEIGHT_PX, vec![rotor]);
