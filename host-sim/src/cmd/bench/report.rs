@@ -42,14 +42,9 @@ impl Report {
         }
         let mut out = std::io::stdout().lock();
         if common.json {
-            let seeds = if common.tuning { "tuning" } else { "scored" };
-            let document = json!({
-                "schema": 1, "bench": self.name, "seeds": seeds, "scored_from": SCORED_FROM,
-                "quick": common.quick, "records": self.records,
-            });
-            writeln!(out, "{document}")?;
+            writeln!(out, "{}", self.document(common))?;
         } else if common.csv {
-            self.print_csv(&mut out)?;
+            write!(out, "{}", self.csv())?;
         } else {
             for table in &self.tables {
                 table.print(&mut out)?;
@@ -61,27 +56,41 @@ impl Report {
         Ok(())
     }
 
-    fn print_csv(&self, out: &mut impl std::io::Write) -> anyhow::Result<()> {
+    fn document(&self, common: &Common) -> Value {
+        let seeds = if common.tuning { "tuning" } else { "scored" };
+        json!({
+            "schema": 1, "bench": self.name, "seeds": seeds, "scored_from": SCORED_FROM,
+            "quick": common.quick, "records": self.records,
+        })
+    }
+
+    /// A head, and a line for each record; empty where a record has no such field.
+    fn csv(&self) -> String {
         let mut names: Vec<&String> = Vec::new();
         for name in self.records.iter().flat_map(Map::keys) {
             if !names.contains(&name) {
                 names.push(name);
             }
         }
-        let head: Vec<&str> = names.iter().map(|n| n.as_str()).collect();
-        writeln!(out, "{}", head.join(","))?;
-        for record in &self.records {
-            let cells: Vec<String> = names
-                .iter()
-                .map(|name| match record.get(*name) {
-                    None | Some(Value::Null) => String::new(),
-                    Some(Value::String(text)) => format!("\"{}\"", text.replace('"', "\"\"")),
-                    Some(value) => value.to_string(),
-                })
-                .collect();
-            writeln!(out, "{}", cells.join(","))?;
-        }
-        Ok(())
+        let cell = |value: Option<&Value>| match value {
+            None | Some(Value::Null) => String::new(),
+            Some(Value::String(text)) => quoted(text),
+            Some(value) => value.to_string(),
+        };
+        let head = names.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(",");
+        let rows = self.records.iter().map(|record| {
+            names.iter().map(|name| cell(record.get(*name))).collect::<Vec<_>>().join(",")
+        });
+        std::iter::once(head).chain(rows).map(|line| line + "\n").collect()
+    }
+}
+
+/// A field of a CSV file (RFC 4180), in quotation marks where it could be taken for more than one.
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
     }
 }
 
@@ -127,8 +136,86 @@ pub fn progress(steps: usize, what: &str) -> indicatif::ProgressBar {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::short;
+#[allow(clippy::unwrap_used, clippy::panic)]
+pub mod tests {
+    use super::*;
+
+    /// The fields of a CSV file, line by line.
+    fn fields(csv: &str) -> Vec<Vec<String>> {
+        let (mut rows, mut row, mut field, mut inside) = (vec![], vec![], String::new(), false);
+        let mut characters = csv.chars().peekable();
+        while let Some(c) = characters.next() {
+            match c {
+                '"' if inside && characters.next_if_eq(&'"').is_some() => field.push('"'),
+                '"' => inside = !inside,
+                ',' if !inside => row.push(std::mem::take(&mut field)),
+                '\n' if !inside => {
+                    row.push(std::mem::take(&mut field));
+                    rows.push(std::mem::take(&mut row));
+                }
+                c => field.push(c),
+            }
+        }
+        assert!(!inside && row.is_empty() && field.is_empty(), "cut off: {csv}");
+        rows
+    }
+
+    /// Reads back what programs are given: all that is in the records, and in each line as many fields as in the head;
+    /// and looks that rows of tables are as long as their heads, too.
+    pub fn assert_readable(report: &Report) {
+        let common = Common { quick: true, json: true, csv: false, jobs: None, tuning: true };
+        let text = report.document(&common).to_string();
+        let document: Value = serde_json::from_str(&text).unwrap();
+        for (name, value) in [
+            ("schema", json!(1)),
+            ("bench", json!(report.name)),
+            ("seeds", json!("tuning")),
+            ("scored_from", json!(1000)),
+            ("quick", json!(true)),
+        ] {
+            assert_eq!(document[name], value, "{name}");
+        }
+        let records = document["records"].as_array().unwrap();
+        assert!(!records.is_empty());
+        let rows = fields(&report.csv());
+        assert_eq!(rows.len(), records.len() + 1);
+        for (record, row) in records.iter().zip(&rows[1..]) {
+            assert_eq!(row.len(), rows[0].len(), "{row:?} under {:?}", rows[0]);
+            assert!(record.as_object().unwrap().keys().all(|name| rows[0].contains(name)));
+            for (name, field) in rows[0].iter().zip(row) {
+                let expected = match &record[name] {
+                    Value::Null => String::new(),
+                    Value::String(text) => text.clone(),
+                    value @ (Value::Bool(_) | Value::Number(_)) => value.to_string(),
+                    value => panic!("{name} is not flat: {value}"),
+                };
+                assert_eq!(*field, expected, "{name}");
+            }
+        }
+        for Table { title, columns, rows, .. } in &report.tables {
+            assert!(rows.iter().all(|row| row.len() == columns.len()), "{title}");
+        }
+    }
+
+    #[test]
+    fn commas_and_quotation_marks_stay_in_their_field() {
+        let record = |pairs: &[(&str, Value)]| {
+            pairs.iter().map(|(name, value)| ((*name).to_owned(), value.clone())).collect()
+        };
+        let report = Report {
+            name: "test",
+            records: vec![
+                record(&[("off, all", json!(3)), ("name", json!("two \"m\", three"))]),
+                record(&[("name", json!("plain")), ("only here", json!(0.5))]),
+            ],
+            ..Report::default()
+        };
+        assert_eq!(
+            report.csv(),
+            "name,\"off, all\",only here\n\"two \"\"m\"\", three\",3,\nplain,,0.5\n"
+        );
+        assert_readable(&report);
+    }
 
     #[test]
     fn three_digits() {

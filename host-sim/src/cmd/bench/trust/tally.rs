@@ -143,6 +143,7 @@ pub fn report(trials: &[Trial]) -> Report {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::report::tests::assert_readable;
     use super::*;
 
     fn spoken(error: Option<f64>, sigma: f64, owed: bool) -> Spoken {
@@ -178,5 +179,6 @@ mod tests {
         assert_eq!(wrong(&turning).count(), 0);
         let named: Vec<_> = wrong(&still).collect();
         assert!(named.len() == 1 && named[0].contains("--show 1 "), "{named:?}");
+        assert_readable(&report(&[turning, still]));
     }
 }
