@@ -61,8 +61,7 @@ pub fn run(args: &Args) -> anyhow::Result<Report> {
     let quick = args.common.quick;
     let seeds = args.seeds.unwrap_or(if quick { 2 } else { spec::SEEDS });
     let first = spec::first_seed(args.common.tuning);
-    let models: Vec<Model> =
-        spec::MODELS.into_iter().filter(|m| args.model.is_none_or(|a| a == *m)).collect();
+    let models = spec::models(args.model);
     let places = places(quick, &args.only);
     let jobs: Vec<Job> = (first..first + seeds)
         .flat_map(|seed| models.iter().map(move |model| (seed, *model)))

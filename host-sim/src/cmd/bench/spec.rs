@@ -34,6 +34,19 @@ pub const PAPER_WINDOW_MS: f64 = 150.0;
 /// Both event models, each with figures of its own.
 pub const MODELS: [Model; 2] = [Model::Threshold, Model::Edge];
 
+/// Both event models, or the one that was asked for.
+pub fn models(only: Option<Model>) -> Vec<Model> {
+    MODELS.into_iter().filter(|model| only.is_none_or(|only| only == *model)).collect()
+}
+
+/// The name of an event model in tables.
+pub fn model_name(model: Model) -> &'static str {
+    match model {
+        Model::Threshold => "threshold",
+        Model::Edge => "edge",
+    }
+}
+
 /// The first seed of a run.
 pub fn first_seed(tuning: bool) -> u64 {
     if tuning { 0 } else { SCORED_FROM }
