@@ -1,18 +1,20 @@
 //! `evtach bench blind`: does it find the speed with nothing typed in?
 //!
-//! Right: within 1 % and with the right direction. A reading is owed where the window holds three symmetry periods and two
-//! turns (2 s at most), the rotor makes 2000 events a turn, and the blades pass at most 150 000 times a minute; elsewhere
-//! a refusal is as good as a reading. A wrong reading is wrong everywhere, and makes the exit code 1.
+//! Right: the conclusive reading is within 1 % and has the right direction. Wrong: any reading of the recording is not, or
+//! tells a speed where no rotor is; that makes the exit code 1. A reading is owed where the window holds three symmetry
+//! periods and two turns (2 s at most), the rotor makes 2000 events a turn, and the blades pass at most 150 000 times a
+//! minute; elsewhere a refusal is as good as a reading.
 
-use evtach_core::{Geometry, Settings};
+mod tables;
+
+use evtach_core::{Geometry, Reason, Settings};
 use evtach_host::synth::{Model, Motion, generate};
 use rayon::prelude::*;
-use serde_json::{Map, Value};
 
 use super::Common;
 use super::drive::{Capacity, conclusive, readings};
-use super::report::{Report, Table, progress};
-use super::score::score;
+use super::report::{Report, progress};
+use super::score::{Scores, is_wrong, score};
 use super::spec::{self, Condition, Mount};
 
 /// Speeds of the map in rpm.
@@ -54,8 +56,20 @@ struct Outcome {
     seed: u64,
     capacity: Capacity,
     owed: bool,
+    /// Whether blades pass so fast that `too_fast` is the right answer.
+    too_fast: bool,
+    found: Found,
+}
+
+/// What the readings of one recording say.
+#[derive(Clone, Copy, Debug)]
+struct Found {
     verdict: Verdict,
+    readings: usize,
+    wrong_readings: usize,
     blades_right: bool,
+    /// Why there is no speed, where it was refused.
+    reason: Option<&'static str>,
 }
 
 /// Runs the benchmark.
@@ -89,12 +103,22 @@ pub fn run(args: &Args) -> anyhow::Result<Report> {
         .collect::<anyhow::Result<Vec<_>>>()?;
     bar.finish_and_clear();
     let outcomes: Vec<Outcome> = outcomes.into_iter().flatten().collect();
-    let tables = Capacity::ALL.map(|capacity| table(&outcomes, speeds, counts, capacity, mount));
+    let mut shown = Vec::new();
+    for model in spec::MODELS {
+        for capacity in Capacity::ALL {
+            let of = |o: &&Outcome| o.model == model && o.capacity == capacity;
+            let these: Vec<&Outcome> = outcomes.iter().filter(of).collect();
+            let (mount, model, memory) =
+                (mount.as_str(), spec::model_name(model), capacity.as_str());
+            let title = format!("blind start, {mount} [{model} model, {memory} memory]");
+            shown.push(tables::table(title, &these, speeds, counts));
+        }
+    }
     Ok(Report {
         name: "blind",
-        tables: tables.into(),
-        records: outcomes.iter().map(record).collect(),
-        wrong: outcomes.iter().filter_map(wrong).collect(),
+        tables: shown,
+        records: outcomes.iter().map(tables::record).collect(),
+        wrong: outcomes.iter().filter_map(tables::wrong).collect(),
     })
 }
 
@@ -106,105 +130,88 @@ fn measure(condition: &Condition, seed: u64) -> anyhow::Result<[Outcome; 2]> {
     let turns = scene.duration_s() * rpm / 60.0;
     let periods = turns * f64::from(condition.blades);
     let per_turn = made.truth.rotors[0].events as f64 / turns;
-    let owed = turns >= 2.0
-        && periods >= 3.0
-        && per_turn >= OWED_EVENTS_PER_TURN
-        && rpm * f64::from(condition.blades) <= MAX_PASSAGES;
+    let too_fast = rpm * f64::from(condition.blades) > MAX_PASSAGES;
+    let owed = turns >= 2.0 && periods >= 3.0 && per_turn >= OWED_EVENTS_PER_TURN && !too_fast;
     let Some(geometry) = Geometry::new(scene.width_px, scene.height_px) else {
         anyhow::bail!("the scene's sensor is larger than the tachometer's");
     };
     Ok(Capacity::ALL.map(|capacity| {
         let series = readings(&made.events, &[], Settings::new(geometry), capacity);
-        let (mut verdict, mut blades_right) = (Verdict::Refused, false);
-        if let Some(reading) = conclusive(&series) {
-            let scores = score(&scene, &motion, reading);
-            let found = scores.rotors.first().cloned().flatten();
-            if let Some(error) = found.as_ref().and_then(|s| s.camera) {
-                verdict = if error.abs() <= 0.01 { Verdict::Right } else { Verdict::Wrong };
-            }
-            if scores.ghosts > 0 {
-                verdict = Verdict::Wrong;
-            }
-            blades_right = found.is_some_and(|s| s.blades == Some(condition.blades));
-        }
+        let score = |reading| score(&scene, &motion, reading);
+        let scored: Vec<Scores> = series.iter().map(score).collect();
+        let last = conclusive(&series).map(score).unwrap_or_default();
+        let silent = series.last().and_then(|r| r.status.reason()).map(Reason::as_str);
         let Condition { rpm, blades, model, .. } = *condition;
-        Outcome { rpm, blades, model, seed, capacity, owed, verdict, blades_right }
+        let found = judge(&scored, &last, blades, silent);
+        Outcome { rpm, blades, model, seed, capacity, owed, too_fast, found }
     }))
 }
 
-fn table(
-    all: &[Outcome],
-    speeds: &[f64],
-    counts: &[u8],
-    capacity: Capacity,
-    mount: Mount,
-) -> Table {
-    let all: Vec<&Outcome> = all.iter().filter(|o| o.capacity == capacity).collect();
-    let count = |f: &dyn Fn(&Outcome) -> bool| all.iter().filter(|o| f(o)).count();
-    let owed = count(&|o| o.owed);
-    let right = count(&|o| o.owed && o.verdict == Verdict::Right);
-    let wrong = count(&|o| o.verdict == Verdict::Wrong);
-    let named = count(&|o| o.verdict == Verdict::Right && o.blades_right);
-    let any_right = count(&|o| o.verdict == Verdict::Right);
-    let share = |part: usize, whole: usize| 100.0 * part as f64 / whole.max(1) as f64;
-    let notes = vec![
-        "right/recordings; !n: wrong readings; brackets: no reading is owed".to_owned(),
-        format!("right where owed: {right} of {owed} ({:.1} %)", share(right, owed)),
-        format!("wrong anywhere: {wrong} of {}", all.len()),
-        format!("blade count right among right speeds: {:.1} %", share(named, any_right)),
-    ];
-    let mut columns = vec!["rpm".to_owned()];
-    columns.extend(counts.iter().map(|n| format!("{n} blades")));
-    let cell = |rpm: f64, blades: u8| {
-        let here: Vec<_> = all.iter().filter(|o| o.rpm == rpm && o.blades == blades).collect();
-        let of = |v: Verdict| here.iter().filter(|o| o.verdict == v).count();
-        let wrong = of(Verdict::Wrong);
-        let mark = if wrong > 0 { format!("!{wrong}") } else { String::new() };
-        let text = format!("{}/{}{mark}", of(Verdict::Right), here.len());
-        if here.iter().any(|o| o.owed) { text } else { format!("({text})") }
+/// Judges all readings of a recording, the conclusive one, and why there was no speed in the last of them.
+fn judge(
+    scored: &[Scores],
+    conclusive: &Scores,
+    blades: u8,
+    silent: Option<&'static str>,
+) -> Found {
+    let wrong = |s: &&Scores| {
+        s.ghosts > 0 || s.rotors.iter().flatten().filter_map(|r| r.camera).any(is_wrong)
     };
-    let rows = speeds
-        .iter()
-        .map(|&rpm| {
-            let mut row = vec![format!("{rpm}")];
-            row.extend(counts.iter().map(|&n| cell(rpm, n)));
-            row
-        })
-        .collect();
-    let title =
-        format!("blind start, {}, both models [{} memory]", mount.as_str(), capacity.as_str());
-    Table { title, notes, columns, rows }
-}
-
-/// Names the recording that was read wrongly.
-fn wrong(o: &Outcome) -> Option<String> {
-    (o.verdict == Verdict::Wrong).then(|| {
-        let Outcome { rpm, blades, seed, .. } = o;
-        let (model, capacity) = (model_name(o.model), o.capacity.as_str());
-        format!(
-            "wrong reading: {rpm} rpm, {blades} blades, seed {seed}, {model} model, {capacity} memory"
-        )
-    })
-}
-
-fn model_name(model: Model) -> &'static str {
-    if model == Model::Edge { "edge" } else { "threshold" }
-}
-
-fn record(o: &Outcome) -> Map<String, Value> {
-    let verdict = match o.verdict {
-        Verdict::Right => "right",
-        Verdict::Wrong => "wrong",
-        Verdict::Refused => "refused",
+    let wrong_readings = scored.iter().filter(wrong).count();
+    let rotor = conclusive.rotors.first().and_then(Option::as_ref);
+    let verdict = match rotor.and_then(|r| r.camera) {
+        _ if wrong_readings > 0 => Verdict::Wrong,
+        Some(_) => Verdict::Right,
+        None => Verdict::Refused,
     };
-    let pairs: [(&str, Value); 7] = [
-        ("rpm", o.rpm.into()),
-        ("blades", o.blades.into()),
-        ("model", model_name(o.model).into()),
-        ("capacity", o.capacity.as_str().into()),
-        ("owed", o.owed.into()),
-        ("verdict", verdict.into()),
-        ("blades_right", o.blades_right.into()),
-    ];
-    pairs.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()
+    let reason = rotor.and_then(|r| r.reason).or(silent);
+    Found {
+        verdict,
+        readings: scored.len(),
+        wrong_readings,
+        blades_right: rotor.is_some_and(|r| r.blades == Some(blades)),
+        reason: reason.filter(|_| verdict == Verdict::Refused),
+    }
+}
+
+#[cfg(test)]
+pub mod tests {
+    use super::super::score::Score;
+    use super::*;
+
+    /// A reading of the one rotor with this error.
+    pub fn told(error: f64) -> Scores {
+        let score = Score { camera: Some(error), blades: Some(3), ..Score::default() };
+        Scores { rotors: vec![Some(score)], ghosts: 0 }
+    }
+
+    /// A reading that found the rotor and refused it.
+    pub fn refused(reason: &'static str) -> Scores {
+        let score = Score { reason: Some(reason), ..Score::default() };
+        Scores { rotors: vec![Some(score)], ghosts: 0 }
+    }
+
+    fn verdict(scored: &[Scores]) -> (Verdict, usize) {
+        let found = judge(scored, &scored[scored.len() - 1], 3, None);
+        (found.verdict, found.wrong_readings)
+    }
+
+    #[test]
+    fn one_wrong_reading_among_right_ones_makes_the_recording_wrong() {
+        assert_eq!(verdict(&[told(0.001), told(-0.002)]), (Verdict::Right, 0));
+        assert_eq!(verdict(&[told(0.02), told(0.001)]), (Verdict::Wrong, 1));
+        assert_eq!(verdict(&[told(0.001), told(-2.0), told(0.001)]), (Verdict::Wrong, 1));
+        assert_eq!(verdict(&[told(0.5), refused("ambiguous")]), (Verdict::Wrong, 1));
+        let ghost = Scores { ghosts: 1, ..refused("ambiguous") };
+        assert_eq!(verdict(&[ghost, told(0.001)]), (Verdict::Wrong, 1));
+        assert_eq!(verdict(&[refused("ambiguous"), told(0.001)]), (Verdict::Right, 0));
+    }
+
+    #[test]
+    fn a_refusal_is_named_by_the_rotor_and_else_by_the_reading() {
+        let reason = |last: &Scores, silent| judge(&[], last, 3, silent).reason;
+        assert_eq!(reason(&refused("too_fast"), Some("ambiguous")), Some("too_fast"));
+        assert_eq!(reason(&Scores::default(), Some("no_rotation")), Some("no_rotation"));
+        assert_eq!(reason(&told(0.001), Some("no_rotation")), None);
+    }
 }

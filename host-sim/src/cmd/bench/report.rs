@@ -1,5 +1,7 @@
 //! Tables for people, records for programs.
 
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
 use std::io::Write as _;
 
 use serde_json::{Map, Value, json};
@@ -59,7 +61,7 @@ impl Report {
     fn document(&self, common: &Common) -> Value {
         let seeds = if common.tuning { "tuning" } else { "scored" };
         json!({
-            "schema": 1, "bench": self.name, "seeds": seeds, "scored_from": SCORED_FROM,
+            "schema": 2, "bench": self.name, "seeds": seeds, "scored_from": SCORED_FROM,
             "quick": common.quick, "records": self.records,
         })
     }
@@ -127,6 +129,15 @@ pub fn short(value: f64) -> String {
     format!("{value:.*}", digits.clamp(0, 5) as usize)
 }
 
+/// How often each name came, the most frequent first.
+pub fn counted<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+    let mut counts = BTreeMap::<&str, usize>::new();
+    names.into_iter().for_each(|name| *counts.entry(name).or_default() += 1);
+    let mut counts: Vec<_> = counts.into_iter().collect();
+    counts.sort_by_key(|(_, count)| Reverse(*count));
+    counts.iter().map(|(name, count)| format!("{name} {count}")).collect::<Vec<_>>().join(", ")
+}
+
 /// A progress bar on stderr; nothing where stderr is no terminal.
 pub fn progress(steps: usize, what: &str) -> indicatif::ProgressBar {
     let template = "{msg} {bar:40} {pos}/{len} {eta}";
@@ -167,7 +178,7 @@ pub mod tests {
         let text = report.document(&common).to_string();
         let document: Value = serde_json::from_str(&text).unwrap();
         for (name, value) in [
-            ("schema", json!(1)),
+            ("schema", json!(2)),
             ("bench", json!(report.name)),
             ("seeds", json!("tuning")),
             ("scored_from", json!(1000)),
@@ -215,6 +226,12 @@ pub mod tests {
             "name,\"off, all\",only here\n\"two \"\"m\"\", three\",3,\nplain,,0.5\n"
         );
         assert_readable(&report);
+    }
+
+    #[test]
+    fn the_most_frequent_is_named_first() {
+        assert_eq!(counted(["few", "many", "also", "many"]), "many 2, also 1, few 1");
+        assert_eq!(counted([]), "");
     }
 
     #[test]

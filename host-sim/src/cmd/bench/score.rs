@@ -6,6 +6,14 @@ use evtach_host::synth::{Motion, Scene};
 /// Revolutions per minute per rad/s.
 const RPM: f64 = 60.0 / std::f64::consts::TAU;
 
+/// Relative error beyond which a speed is wrong.
+const WRONG: f64 = 0.01;
+
+/// Whether a speed with this relative error is wrong; in the wrong direction it always is.
+pub fn is_wrong(error: f64) -> bool {
+    error.is_nan() || error.abs() > WRONG
+}
+
 /// One measured rotor against its truth. Errors are relative and signed: estimate over truth, less one, so a speed of the
 /// right size in the wrong direction has an error of -2.
 #[derive(Clone, Debug, Default)]
@@ -158,7 +166,10 @@ mod tests {
     fn the_wrong_direction_is_an_error_of_two() {
         let scene = Scene::default();
         let scores = score(&scene, &Motion::new(&scene), &reading(&[at(175.0, -3000.0)]));
-        assert!((scores.rotors[0].as_ref().unwrap().room.unwrap() + 2.0).abs() < 1e-3);
+        let error = scores.rotors[0].as_ref().unwrap().room.unwrap();
+        assert!((error + 2.0).abs() < 1e-3);
+        assert!(is_wrong(error) && is_wrong(0.0101) && is_wrong(f64::NAN));
+        assert!(!is_wrong(-0.0099));
     }
 
     #[test]
