@@ -1,28 +1,30 @@
 //! `evtach bench trust`: can a reading be relied on?
 //!
-//! Random scenes, a fifth of them without any rotor ([`scenes`] says which). Every reading of every recording is compared
-//! with the room's truth of its own window. Results go to a file line by line, so that a long run may be stopped and
-//! taken up again. A wrong reading makes the exit code 1.
+//! Random scenes, a fifth of them without any rotor ([`scenes`] says which), over both event models. Every reading of every
+//! recording is compared with the room's truth of its own window. How often the stated error holds is asked of the last
+//! speed of each rotor, as readings of one recording are much alike; of all speeds is told how many are more than six of
+//! it off. Results go to a file line by line, so that a long run may be stopped and taken up again. A wrong reading makes
+//! the exit code 1.
 
 mod scenes;
 mod tally;
 
 use std::collections::BTreeSet;
 use std::fs::OpenOptions;
-use std::io::{BufRead as _, BufReader, Write as _};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use anyhow::{Context as _, bail};
 use evtach_core::{Geometry, Reading, Settings};
-use evtach_host::synth::{Motion, Scene, generate};
+use evtach_host::synth::{Model, Motion, Scene, generate};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::Common;
 use super::drive::{Capacity, conclusive, readings};
 use super::report::{Report, progress};
-use super::score::{Score, score};
+use super::score::{Score, is_wrong, score};
 use super::spec;
 
 /// Counts the changes of [`scenes`]: results of different scenes must not be mixed in one file.
@@ -56,6 +58,9 @@ struct Head {
 struct Trial {
     /// Seed of the scene.
     trial: u64,
+    /// Event model of the scene; older files do not tell, then [`resume`] does.
+    #[serde(default)]
+    model: Option<Model>,
     /// Rotors in the scene.
     rotors: usize,
     /// One for each capacity.
@@ -72,6 +77,12 @@ struct Outcome {
     speeds: usize,
     /// Of these, more than 1 % off.
     wrong: usize,
+    /// Of the speeds, those with a standard error; 0 in older files, which did not count them.
+    #[serde(default)]
+    with_sigma: usize,
+    /// Of these, more than six standard errors off.
+    #[serde(default)]
+    beyond_6: usize,
     /// Why the last reading gave no speed at all.
     reason: Option<String>,
     /// The conclusive reading of each rotor.
@@ -151,19 +162,23 @@ fn resume(path: &Path) -> anyhow::Result<Vec<Trial>> {
         writeln!(file, "{}", serde_json::to_string(&head)?)?;
         return Ok(Vec::new());
     }
-    let file = std::fs::File::open(path)
+    let text = std::fs::read_to_string(path)
         .with_context(|| format!("{}: cannot be read; choose another --file", path.display()))?;
-    let mut lines = BufReader::new(file).lines();
-    let first = lines.next().transpose()?.unwrap_or_default();
-    if serde_json::from_str::<Head>(&first).ok().as_ref() != Some(&head) {
+    let mut lines = text.lines();
+    let first = lines.next().unwrap_or_default();
+    if serde_json::from_str::<Head>(first).ok().as_ref() != Some(&head) {
         bail!("{}: made by another version; delete it or choose another --file", path.display());
     }
-    let mut trials = Vec::new();
-    for line in lines {
-        // A run that was stopped may have left half a line; its scene is run again.
-        if let Ok(trial) = serde_json::from_str(&line?) {
-            trials.push(trial);
-        }
+    // A run that was stopped may have left half a line: it is ended, and its scene is run again.
+    if !text.ends_with('\n') {
+        let file = OpenOptions::new().append(true).open(path);
+        file.and_then(|mut file| writeln!(file)).with_context(|| {
+            format!("{}: cannot be written; choose another --file", path.display())
+        })?;
+    }
+    let mut trials: Vec<Trial> = lines.filter_map(|line| serde_json::from_str(line).ok()).collect();
+    for trial in &mut trials {
+        trial.model.get_or_insert_with(|| scenes::scene(trial.trial).model);
     }
     Ok(trials)
 }
@@ -182,7 +197,12 @@ fn measure(number: u64) -> anyhow::Result<Trial> {
         let series = readings(&made.events, &made.gyro, settings, capacity);
         outcome(&scene, &motion, &series, &owed, capacity)
     });
-    Ok(Trial { trial: number, rotors: scene.rotors.len(), results: results.collect() })
+    Ok(Trial {
+        trial: number,
+        model: Some(scene.model),
+        rotors: scene.rotors.len(),
+        results: results.collect(),
+    })
 }
 
 /// Whether a reading of this rotor may be expected.
@@ -194,6 +214,11 @@ fn owed(scene: &Scene, events: u64, number: usize) -> bool {
     turns >= 2.0 && periods >= 3.0 && rotor.radius_px >= 20.0 && per_turn >= 2000.0
 }
 
+/// By how many stated standard errors a speed is off; `None` where none is stated.
+fn off_sigmas(error: f64, sigma: Option<f64>) -> Option<f64> {
+    sigma.filter(|sigma| *sigma > 0.0).map(|sigma| (error / sigma).abs())
+}
+
 fn outcome(
     scene: &Scene,
     motion: &Motion,
@@ -202,8 +227,10 @@ fn outcome(
     capacity: Capacity,
 ) -> Outcome {
     let scored: Vec<_> = series.iter().map(|reading| score(scene, motion, reading)).collect();
-    let errors = scored.iter().flat_map(|s| &s.rotors).flatten().filter_map(|s| s.room);
-    let wrong = errors.clone().filter(|e| e.abs() > 0.01).count();
+    let told = scored.iter().flat_map(|s| &s.rotors).flatten();
+    let errors = told.clone().filter_map(|s| s.room);
+    let off_sigmas = told.filter_map(|s| off_sigmas(s.room?, s.sigma));
+    let wrong = errors.clone().filter(|e| is_wrong(*e)).count();
     let last = conclusive(series).map(|reading| score(scene, motion, reading));
     let found = |number: usize| -> Score {
         last.as_ref().and_then(|s| s.rotors.get(number).cloned().flatten()).unwrap_or_default()
@@ -218,7 +245,63 @@ fn outcome(
         ghosts: scored.iter().map(|s| s.ghosts).sum(),
         speeds: errors.count(),
         wrong,
+        with_sigma: off_sigmas.clone().count(),
+        beyond_6: off_sigmas.filter(|z| *z > 6.0).count(),
         reason: series.last().and_then(|r| r.status.reason()).map(|r| r.as_str().to_owned()),
         rotors: spoken.collect(),
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::super::report::tests::assert_readable;
+    use super::*;
+
+    fn args(file: PathBuf, trials: u64) -> Args {
+        let common = Common { quick: false, json: false, csv: false, jobs: None, tuning: true };
+        Args { common, trials: Some(trials), file, show: None }
+    }
+
+    #[test]
+    fn a_run_is_taken_up_where_it_was_stopped() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("trust.jsonl");
+        let first = run(&args(path.clone(), 1)).unwrap();
+        assert_readable(&first);
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(text.lines().count(), 2, "{text}");
+        // A change shows that the line is read, not made again; and the next one is half written.
+        let marked = text.replace("\"rotors\":1,", "\"rotors\":7,");
+        assert_ne!(marked, text);
+        std::fs::write(&path, marked.clone() + "{\"trial\":1,\"rot").unwrap();
+        let both = run(&args(path.clone(), 2)).unwrap();
+        assert_readable(&both);
+        assert_eq!(both.records[0]["scenes"], 2);
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.starts_with(&marked) && text.lines().count() == 4, "{text}");
+        let again = run(&args(path.clone(), 2)).unwrap();
+        assert_eq!(again.records, both.records);
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+    }
+
+    #[test]
+    fn older_files_are_read_and_those_of_other_scenes_are_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("trust.jsonl");
+        assert!(resume(&path).unwrap().is_empty());
+        let old = r#"{"trial":5,"rotors":1,"results":[{"capacity":"full","ghosts":0,"speeds":2,"wrong":0,
+            "reason":null,"rotors":[{"owed":true,"error":1e-4,"sigma":1e-4,"locked":true,"reason":null}]}]}"#;
+        let mut file = OpenOptions::new().append(true).open(&path).unwrap();
+        writeln!(file, "{}", old.replace('\n', "")).unwrap();
+        let trials = resume(&path).unwrap();
+        assert_eq!(trials.len(), 1);
+        assert_eq!(trials[0].model, Some(scenes::scene(5).model));
+        assert_eq!((trials[0].results[0].speeds, trials[0].results[0].with_sigma), (2, 0));
+        let head = std::fs::read_to_string(&path)
+            .unwrap()
+            .replace("\"scenes_version\":", "\"scenes_version\":9");
+        std::fs::write(&path, head).unwrap();
+        assert!(resume(&path).unwrap_err().to_string().contains("made by another version"));
     }
 }

@@ -3,8 +3,9 @@
 use serde_json::{Map, Value};
 
 use super::super::drive::Capacity;
-use super::super::report::{Report, Table};
-use super::{Outcome, Spoken, Trial};
+use super::super::report::{Report, Table, counted};
+use super::super::spec::{MODELS, model_name};
+use super::{Outcome, Spoken, Trial, off_sigmas};
 
 /// What one capacity made of all trials.
 #[derive(Debug, Default)]
@@ -22,10 +23,13 @@ struct Tally {
     locked: usize,
     owed: usize,
     owed_refused: usize,
-    within_95: usize,
-    beyond_6: usize,
     with_sigma: usize,
-    reasons: Vec<(String, usize)>,
+    beyond_6: usize,
+    last_with_sigma: usize,
+    last_within_95: usize,
+    last_beyond_6: usize,
+    /// Why each rotor that was not read was refused.
+    reasons: Vec<String>,
 }
 
 impl Tally {
@@ -39,6 +43,8 @@ impl Tally {
         }
         self.speeds += outcome.speeds;
         self.wrong += outcome.wrong;
+        self.with_sigma += outcome.with_sigma;
+        self.beyond_6 += outcome.beyond_6;
         for rotor in &outcome.rotors {
             self.add_rotor(rotor, outcome);
         }
@@ -51,41 +57,86 @@ impl Tally {
         let Some(error) = rotor.error else {
             self.owed_refused += usize::from(rotor.owed);
             let reason = rotor.reason.as_ref().or(outcome.reason.as_ref());
-            let name = reason.map_or("not found", String::as_str);
-            match self.reasons.iter_mut().find(|(n, _)| n == name) {
-                Some((_, count)) => *count += 1,
-                None => self.reasons.push((name.to_owned(), 1)),
-            }
+            self.reasons.push(reason.map_or("not found", String::as_str).to_owned());
             return;
         };
         self.read += 1;
-        if let Some(sigma) = rotor.sigma.filter(|s| *s > 0.0) {
-            let z = (error / sigma).abs();
-            self.with_sigma += 1;
-            self.within_95 += usize::from(z <= 1.96);
-            self.beyond_6 += usize::from(z > 6.0);
+        if let Some(off) = off_sigmas(error, rotor.sigma) {
+            self.last_with_sigma += 1;
+            self.last_within_95 += usize::from(off <= 1.96);
+            self.last_beyond_6 += usize::from(off > 6.0);
         }
     }
 
-    /// Name, count, whole, and the limit that is asked for.
-    fn lines(&self) -> [(&'static str, usize, usize, &'static str); 9] {
+    fn lines(&self) -> [Line; 10] {
+        let line = |key, name, count, of, asked| Line { key, name, count, of, asked };
+        let turning_scenes = self.scenes - self.still_scenes;
         [
-            ("speeds more than 1 % off, all readings", self.wrong, self.speeds, "none"),
-            (
-                "speeds where no rotor is, beside one",
-                self.ghosts,
-                self.scenes - self.still_scenes,
+            line(
+                "wrong",
+                "speeds more than 1 % off, all readings",
+                self.wrong,
+                self.speeds,
                 "none",
             ),
-            ("still scenes with any speed", self.ghost_scenes, self.still_scenes, "none"),
-            ("beyond 6 sigma", self.beyond_6, self.with_sigma, "at most 1 in 2000"),
-            ("truth within 1.96 sigma", self.within_95, self.with_sigma, "92 to 98 %"),
-            ("refused although a reading is owed", self.owed_refused, self.owed, "at most 3 %"),
-            ("rotors read", self.read, self.rotors, "at least 60 %"),
-            ("of these locked", self.locked, self.read, ""),
-            ("rotors refused", self.rotors - self.read, self.rotors, ""),
+            line(
+                "ghosts",
+                "speeds where no rotor is, beside one",
+                self.ghosts,
+                turning_scenes,
+                "none",
+            ),
+            line(
+                "ghost_scenes",
+                "still scenes with any speed",
+                self.ghost_scenes,
+                self.still_scenes,
+                "none",
+            ),
+            line(
+                "beyond_6_sigma",
+                "beyond 6 sigma, all readings",
+                self.beyond_6,
+                self.with_sigma,
+                "",
+            ),
+            line(
+                "last_beyond_6_sigma",
+                "beyond 6 sigma, last reading",
+                self.last_beyond_6,
+                self.last_with_sigma,
+                "at most 1 in 2000",
+            ),
+            line(
+                "last_within_1_96_sigma",
+                "truth within 1.96 sigma, last reading",
+                self.last_within_95,
+                self.last_with_sigma,
+                "92 to 98 %",
+            ),
+            line(
+                "owed_refused",
+                "refused although a reading is owed",
+                self.owed_refused,
+                self.owed,
+                "at most 3 %",
+            ),
+            line("read", "rotors read", self.read, self.rotors, "at least 60 %"),
+            line("locked", "of these locked", self.locked, self.read, ""),
+            line("refused", "rotors refused", self.rotors - self.read, self.rotors, ""),
         ]
     }
+}
+
+/// A row of the table.
+struct Line {
+    /// Its name in records; `KEY_of` is the whole.
+    key: &'static str,
+    name: &'static str,
+    count: usize,
+    of: usize,
+    /// The limit that is asked for.
+    asked: &'static str,
 }
 
 /// Names the scene where speeds were wrong, or were told where no rotor is.
@@ -103,46 +154,64 @@ fn wrong(trial: &Trial) -> impl Iterator<Item = String> + '_ {
     trial.results.iter().filter_map(of)
 }
 
-/// The report over all trials.
+/// The report over all trials: for each capacity a table of all, and one for each event model.
 pub fn report(trials: &[Trial]) -> Report {
     let wrong = trials.iter().flat_map(wrong).collect();
     let mut report = Report { name: "trust", wrong, ..Report::default() };
-    for capacity in Capacity::ALL {
-        let mut tally = Tally::default();
-        for trial in trials {
-            let of = trial.results.iter().filter(|o| o.capacity == capacity.as_str());
-            of.for_each(|outcome| tally.add(trial, outcome));
+    for model in std::iter::once(None).chain(MODELS.map(Some)) {
+        for capacity in Capacity::ALL {
+            let mut tally = Tally::default();
+            for trial in trials.iter().filter(|t| model.is_none() || t.model == model) {
+                let of = trial.results.iter().filter(|o| o.capacity == capacity.as_str());
+                of.for_each(|outcome| tally.add(trial, outcome));
+            }
+            let model = model.map_or("both", model_name);
+            report.tables.push(table(&tally, model, capacity));
+            report.records.push(record(&tally, model, capacity));
         }
-        let percent = |part: usize, whole: usize| 100.0 * part as f64 / whole.max(1) as f64;
-        let mut record = Map::new();
-        record.insert("capacity".to_owned(), capacity.as_str().into());
-        record.insert("scenes".to_owned(), tally.scenes.into());
-        let mut rows = Vec::new();
-        for (name, part, whole, limit) in tally.lines() {
-            let share = format!("{:.2} %", percent(part, whole));
-            rows.push(vec![
-                name.to_owned(),
-                part.to_string(),
-                whole.to_string(),
-                share,
-                limit.to_owned(),
-            ]);
-            record.insert(name.replace(' ', "_"), Value::from(part));
-            record.insert(format!("{}_of", name.replace(' ', "_")), Value::from(whole));
-        }
-        tally.reasons.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-        let reasons: Vec<String> = tally.reasons.iter().map(|(n, c)| format!("{n} {c}")).collect();
-        let notes = vec![format!("reasons of the refused: {}", reasons.join(", "))];
-        let columns = ["", "count", "of", "share", "asked for"].map(str::to_owned).to_vec();
-        let title = format!("trust: {} random scenes [{} memory]", tally.scenes, capacity.as_str());
-        report.tables.push(Table { title, notes, columns, rows });
-        report.records.push(record);
     }
     report
 }
 
+fn table(tally: &Tally, model: &str, capacity: Capacity) -> Table {
+    let mut notes = Vec::new();
+    if !tally.reasons.is_empty() {
+        let reasons = counted(tally.reasons.iter().map(String::as_str));
+        notes.push(format!("reasons of the refused: {reasons}"));
+    }
+    let rows = tally.lines().map(|Line { name, count, of, asked, .. }| {
+        let share = format!("{:.2} %", 100.0 * count as f64 / of.max(1) as f64);
+        vec![name.to_owned(), count.to_string(), of.to_string(), share, asked.to_owned()]
+    });
+    Table {
+        title: format!(
+            "trust: {} random scenes [{model} model{}, {} memory]",
+            tally.scenes,
+            if model == "both" { "s" } else { "" },
+            capacity.as_str()
+        ),
+        notes,
+        columns: ["", "count", "of", "share", "asked for"].map(str::to_owned).to_vec(),
+        rows: rows.into(),
+    }
+}
+
+fn record(tally: &Tally, model: &str, capacity: Capacity) -> Map<String, Value> {
+    let mut record = Map::new();
+    record.insert("model".to_owned(), model.into());
+    record.insert("capacity".to_owned(), capacity.as_str().into());
+    record.insert("scenes".to_owned(), tally.scenes.into());
+    for Line { key, count, of, .. } in tally.lines() {
+        record.insert(key.to_owned(), count.into());
+        record.insert(format!("{key}_of"), of.into());
+    }
+    record
+}
+
 #[cfg(test)]
 mod tests {
+    use evtach_host::synth::Model;
+
     use super::super::super::report::tests::assert_readable;
     use super::*;
 
@@ -157,6 +226,8 @@ mod tests {
             ghosts,
             speeds: rotors.len(),
             wrong: 0,
+            with_sigma: 3,
+            beyond_6: 2,
             reason: Some("no_rotation".to_owned()),
             rotors,
         };
@@ -166,19 +237,39 @@ mod tests {
             spoken(None, 0.0, true),
             spoken(None, 0.0, false),
         ];
-        let turning = Trial { trial: 0, rotors: 4, results: vec![outcome(0, rotors)] };
-        let still = Trial { trial: 1, rotors: 0, results: vec![outcome(2, Vec::new())] };
+        let turning = Trial {
+            trial: 0,
+            model: Some(Model::Edge),
+            rotors: 4,
+            results: vec![outcome(0, rotors)],
+        };
+        let still = Trial {
+            trial: 1,
+            model: Some(Model::Threshold),
+            rotors: 0,
+            results: vec![outcome(2, Vec::new())],
+        };
         let mut tally = Tally::default();
         for trial in [&turning, &still] {
             tally.add(trial, &trial.results[0]);
         }
         assert_eq!((tally.read, tally.owed, tally.owed_refused), (2, 3, 1));
-        assert_eq!((tally.within_95, tally.beyond_6, tally.with_sigma), (1, 1, 2));
+        let last = (tally.last_within_95, tally.last_beyond_6, tally.last_with_sigma);
+        assert_eq!(last, (1, 1, 2));
+        assert_eq!((tally.beyond_6, tally.with_sigma), (4, 6));
         assert_eq!((tally.ghost_scenes, tally.still_scenes, tally.ghosts), (1, 1, 0));
-        assert_eq!(tally.reasons, vec![("no_rotation".to_owned(), 2)]);
+        assert_eq!(tally.reasons, ["no_rotation"; 2]);
         assert_eq!(wrong(&turning).count(), 0);
         let named: Vec<_> = wrong(&still).collect();
         assert!(named.len() == 1 && named[0].contains("--show 1 "), "{named:?}");
-        assert_readable(&report(&[turning, still]));
+        let report = report(&[turning, still]);
+        assert_readable(&report);
+        let of = |model: &str, key: &str| {
+            let is = |r: &&Map<String, Value>| r["model"] == model && r["capacity"] == "full";
+            report.records.iter().find(is).and_then(|r| r[key].as_u64())
+        };
+        assert_eq!(of("both", "scenes"), Some(2));
+        assert_eq!((of("edge", "read"), of("edge", "ghost_scenes")), (Some(2), Some(0)));
+        assert_eq!((of("threshold", "read"), of("threshold", "ghost_scenes")), (Some(0), Some(1)));
     }
 }
