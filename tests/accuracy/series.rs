@@ -168,6 +168,23 @@ fn a_motor_that_speeds_up() {
     every_reading("5 % a second", &scene(91, vec![rotor]));
 }
 
+#[test]
+fn an_acceleration_is_told_with_its_sign() {
+    for (rpm, ramp_per_s) in [(1800.0, 0.05), (-3000.0, -0.06)] {
+        let scene = scene(96, vec![Rotor { rpm, ramp_per_s, ..Rotor::default() }]);
+        let made = generate(&scene).expect("a scene in range");
+        let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
+        let (readings, _) = measure(&Loaded { geometry, events: made.events }, Capacity::Full);
+        let speeds = readings.iter().flat_map(|reading| &reading.rotors).filter_map(|r| r.speed);
+        let told: Vec<f32> = speeds.filter_map(|speed| speed.accel_rpm_per_s()).collect();
+        // Of the magnitude, whatever the direction.
+        let right_rpm_per_s = (f64::abs(rpm) * ramp_per_s) as f32;
+        let off = |told: &f32| (told / right_rpm_per_s - 1.0).abs();
+        assert!(2 * told.len() > readings.len(), "{} of {}", told.len(), readings.len());
+        assert!(told.iter().all(|told| off(told) < 0.1), "{right_rpm_per_s}: {told:?}");
+    }
+}
+
 /// A governor's waves: within a window the speed changes by more than a hundred times its sigma, and up to nearly one wave.
 #[test]
 fn a_motor_that_hunts() {
