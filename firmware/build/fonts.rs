@@ -42,6 +42,8 @@ fn write(code: &mut String, source: &Source) -> Result<(), Box<dyn Error>> {
                 );
             }
         }
+        // 26.6 fixed point.
+        let advance = (64.0 * advance_px).round() as u16;
         let image = entry.glyph.images.get(0).mul_offset(1, -1);
         let Rectangle { top_left, size } = image.bounding_box();
         let at = u16::try_from(runs.len())?;
@@ -50,7 +52,7 @@ fn write(code: &mut String, source: &Source) -> Result<(), Box<dyn Error>> {
         let (width, height) = (u8::try_from(size.width)?, u8::try_from(size.height)?);
         writeln!(
             glyphs,
-            "        Glyph {{ advance_px: {advance_px:?}, at: {at}, x: {x}, y: {y}, width: {width}, height: {height} }},"
+            "        Glyph {{ advance: {advance}, at: {at}, x: {x}, y: {y}, width: {width}, height: {height} }},"
         )?;
     }
     let (first, last) = (row.start(), row.end());

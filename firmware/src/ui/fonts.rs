@@ -26,8 +26,20 @@ pub const FONTS: [Source; 3] = [
     Source {
         name: "SMALL",
         about: "Labels: capitals of 11 px.",
-        font: mplus!(1, 500, 15, true, 1, 2, ' '..='~', ["±", "×", "÷", "·", "–"]),
-        row: ' '..='~',
+        font: mplus!(
+            1,
+            500,
+            15,
+            true,
+            1,
+            2,
+            '\''..=')',
+            '+'..=';',
+            'A'..='Z',
+            'a'..='z',
+            [" ", "%", "=", "?", "±", "×", "÷", "·", "–"]
+        ),
+        row: ' '..='z',
         others: "±×÷·–",
     },
     Source {

@@ -6,6 +6,9 @@ use embedded_graphics::pixelcolor::Rgb565;
 use embedded_graphics::prelude::*;
 use embedded_graphics::primitives::Rectangle;
 
+/// Widths are told as TrueType tells them, in 26.6 fixed point.
+const UNITS_A_PX: i32 = 64;
+
 /// A font with the characters that the screen uses.
 pub struct Font {
     /// The first and the last of the characters that follow each other.
@@ -20,8 +23,8 @@ pub struct Font {
 
 /// A letter.
 struct Glyph {
-    /// From it to the next one.
-    advance_px: f32,
+    /// From it to the next one, in [`UNITS_A_PX`]ths of a pixel.
+    advance: u16,
     /// Where its pixels begin in the font's.
     at: u16,
     /// Its corner, from the point where it stands on the baseline.
@@ -35,7 +38,7 @@ include!(concat!(env!("OUT_DIR"), "/fonts.rs"));
 
 impl Glyph {
     /// What stands for a character that the font does not have.
-    const NONE: Self = Self { advance_px: 0.0, at: 0, x: 0, y: 0, width: 0, height: 0 };
+    const NONE: Self = Self { advance: 0, at: 0, x: 0, y: 0, width: 0, height: 0 };
 }
 
 impl Font {
@@ -53,13 +56,13 @@ impl Font {
         self.glyphs.get(index).unwrap_or(&Glyph::NONE)
     }
 
-    /// The letters of a text with how far each is from the start.
-    fn set<'t>(&self, text: &'t str) -> impl Iterator<Item = (f32, &Glyph)> + use<'_, 't> {
-        text.chars().scan(0.0, |x, letter| {
+    /// The letters of a text with how far in pixels each is from the start.
+    fn set<'t>(&self, text: &'t str) -> impl Iterator<Item = (i32, &Glyph)> + use<'_, 't> {
+        text.chars().scan(0, |x, letter| {
             let glyph = self.glyph(letter);
-            let at = *x;
-            *x += glyph.advance_px;
-            Some((at, glyph))
+            let at_px = *x / UNITS_A_PX;
+            *x += i32::from(glyph.advance);
+            Some((at_px, glyph))
         })
     }
 
@@ -119,7 +122,8 @@ impl Ink {
 /// Width of a text in pixels.
 #[must_use]
 pub fn width(font: &Font, text: &str) -> i32 {
-    font.set(text).fold(0.0, |_, (x, glyph)| x + glyph.advance_px) as i32
+    let advances = text.chars().map(|letter| i32::from(font.glyph(letter).advance));
+    advances.sum::<i32>() / UNITS_A_PX
 }
 
 /// Draws one line of text. Characters that the font does not have leave nothing.
@@ -142,7 +146,7 @@ pub fn draw<D: DrawTarget<Color = Rgb565>>(
     };
     let colours = [0, 1, 2, 3].map(|level| ink.level(level));
     for (x, glyph) in font.set(text) {
-        let corner = Point::new(left + x as i32 + i32::from(glyph.x), at.y + i32::from(glyph.y));
+        let corner = Point::new(left + x + i32::from(glyph.x), at.y + i32::from(glyph.y));
         let (width, height) = (i32::from(glyph.width), i32::from(glyph.height));
         let mut place = Point::zero();
         for (level, mut length) in font.runs(glyph) {
@@ -188,7 +192,7 @@ mod tests {
                 let glyph = packed.set(&key).next().map(|(_, glyph)| glyph);
                 let glyph = glyph.expect(&key);
                 if entry.key != key {
-                    assert_eq!((glyph.width, glyph.advance_px), (0, 0.0), "a gap in the row");
+                    assert_eq!((glyph.width, glyph.advance), (0, 0), "a gap in the row");
                     continue;
                 }
                 let image = entry.glyph.images.get(0).mul_offset(1, -1);
@@ -202,7 +206,9 @@ mod tests {
                 let corner = Point::new(glyph.x.into(), glyph.y.into());
                 let size = Size::new(glyph.width.into(), glyph.height.into());
                 assert_eq!(Rectangle::new(corner, size), image.bounding_box(), "{letter}");
-                assert_eq!(glyph.advance_px, (entry.advance_width_to)(""), "{letter}");
+                let advance_px = f32::from(glyph.advance) / UNITS_A_PX as f32;
+                let off_px = advance_px - (entry.advance_width_to)("");
+                assert!(off_px.abs() <= 0.5 / UNITS_A_PX as f32, "{letter} is {off_px} px off");
                 letters += 1;
             }
             assert!(letters >= 12, "{} has {letters}", source.name);
