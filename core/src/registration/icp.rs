@@ -111,6 +111,8 @@ impl Icp {
         self.start_half(start_rad);
     }
 
+    // Nor this.
+    #[inline(never)]
     fn start_half(&mut self, yaw_rad: f32) {
         let target = if self.run.there.is_none() { &self.second } else { &self.first };
         let metric = match self.run.residual {

@@ -107,6 +107,8 @@ pub enum Sifted {
 }
 
 /// The quantile of a histogram of distance classes, in classes.
+// Not inlined: flash is short.
+#[inline(never)]
 fn quantile(classes: &[f32; CLASSES], share: f32) -> f32 {
     let total: f32 = classes.iter().sum();
     let mut below = 0.0;

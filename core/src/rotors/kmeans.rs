@@ -72,6 +72,8 @@ pub fn nearest(clusters: &[Cluster], x_px: f32, y_px: f32) -> (usize, f32) {
 impl KMeans {
     /// Starts with the highest cell as the first seed; none where all are zero.
     #[must_use]
+    // Not inlined: flash is short.
+    #[inline(never)]
     pub fn seed(cells: Cells<'_>) -> Self {
         let mut highest = (0.0, 0.0, 0.0);
         for cell in cells.iter() {

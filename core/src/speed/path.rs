@@ -88,6 +88,12 @@ impl Path {
         (index, place - index as f32)
     }
 
+    /// The instant so far through a block, in microseconds since the middle of the window.
+    #[must_use]
+    pub fn time_us(&self, index: usize, f: f32) -> f32 {
+        self.start_us + (index as f32 + f) * self.step_us
+    }
+
     /// Where the rotor was `t_us` after the middle of the window.
     #[must_use]
     // Not inlined: flash is short.

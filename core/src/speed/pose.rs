@@ -12,6 +12,7 @@
 
 mod blocks;
 mod schedule;
+mod sides;
 mod slope;
 mod template;
 mod tilt;
@@ -29,6 +30,7 @@ use blocks::{
     WALK_TWO_PX, WALK_US, Walk, correct,
 };
 use schedule::{Phase, SETTLED_PX, Schedule};
+use sides::{Inverted, Sides};
 pub use slope::Slope;
 use template::{BANKS, Counts, RINGS, Template};
 pub use tilt::Tilt;
@@ -55,6 +57,10 @@ const TOGETHER: f32 = 0.75;
 const MOST_OFF_RAD: f32 = 1.0;
 /// Phase at the rim by which a correction moves a path that has not arrived: one correction turns a knot by one radian at most.
 const UNDER_WAY_RAD: f32 = 0.9;
+/// Both, in the rounds that look at all events, where some of them had been taken for the wrong polarity and pulled the path aside: it is
+/// learnt together with the template, so each round does a part only of what is left.
+const PULLED_OFF_RAD: f32 = 0.5;
+const PULLED_UNDER_WAY_RAD: f32 = 0.3;
 
 /// Root mean square speed of the axis in px/s from which on the camera moves: a hand makes some 80, and what few events scatter by
 /// looks like 20.
@@ -69,6 +75,7 @@ pub struct Sums {
     low: Template,
     high: Template,
     tilt: TiltSums,
+    sides: Sides,
 }
 
 impl Sums {
@@ -79,6 +86,7 @@ impl Sums {
         low: Template::EMPTY,
         high: Template::EMPTY,
         tilt: TiltSums::EMPTY,
+        sides: Sides::EMPTY,
     };
 
     /// Share of the events in step with the template of the round before.
@@ -111,6 +119,8 @@ pub struct Pose {
     /// Blocks in a symmetry period, 0 when blocks are whole periods.
     in_period: usize,
     phases: Option<[(f32, f32, f32); BANKS]>,
+    /// Where polarities are the other way round.
+    inverted: Inverted,
     coherence: f32,
     /// The same before the harmonic was raised.
     first_coherence: f32,
@@ -161,6 +171,7 @@ impl Pose {
             path: Path::STILL,
             in_period: 0,
             phases: None,
+            inverted: Inverted::UPRIGHT,
             coherence: 0.0,
             first_coherence: 0.0,
             overtone: 0.0,
@@ -278,7 +289,7 @@ impl Pose {
     }
 
     /// Weighs one more segment of the window, or looks at it, or ends a round: corrects the path and learns the template anew;
-    /// `true` once all rounds are done. Cost: about 180 instructions an event, or half a million.
+    /// `true` once all rounds are done. Cost: about 190 instructions an event, or half a million.
     pub fn step(&mut self, window: &Window<'_>, sums: &mut Sums, even: &mut Even) -> bool {
         if !self.started {
             // The axis is thought to be at rest yet.
@@ -317,6 +328,9 @@ impl Pose {
             self.halve(blurred || self.came_apart);
             self.came_apart = true;
             return false;
+        }
+        if self.schedule.asks_sides() && !self.inverted.learn(&sums.sides) {
+            self.schedule.ask_no_sides();
         }
         self.sift(sums);
         if self.schedule.phase() == Phase::Last {
@@ -360,7 +374,13 @@ impl Pose {
         // Nor while the path still moves by more than it reaches.
         let moved_rad = moved_px * self.harmonic as f32 / self.disc.radius_px;
         let corrected = self.phases.is_some();
-        let strays = corrected && moved_px >= SETTLED_PX && 2.0 * moved_rad > MOST_OFF_RAD;
+        let pulled = self.inverted.any() && self.schedule.learns();
+        let (most_off_rad, under_way_rad) = if pulled {
+            (PULLED_OFF_RAD, PULLED_UNDER_WAY_RAD)
+        } else {
+            (MOST_OFF_RAD, UNDER_WAY_RAD)
+        };
+        let strays = corrected && moved_px >= SETTLED_PX && 2.0 * moved_rad > most_off_rad;
         let sharper = (at_high > at_low || shows(least)) && self.may_double() && !waits && !strays;
         // Few events show it as well as many, but a path does not follow them.
         self.overtone = if shows(SHARP_COHERENCE) && !sharper { at_high } else { 0.0 };
@@ -370,7 +390,7 @@ impl Pose {
             self.first_coherence = self.coherence;
         }
         self.phases = Some(if sharper { &sums.high } else { &sums.low }.phases(&sums.counts));
-        let under_way = corrected && moved_rad > UNDER_WAY_RAD;
+        let under_way = corrected && moved_rad > under_way_rad;
         if self.schedule.advance(if sharper { f32::MAX } else { moved_px }, under_way) {
             self.divide();
             let moves = self.drift_px_s() > MOVING_PX_S;
@@ -438,10 +458,14 @@ impl Pose {
         let rate = TurnRate::from_rad_s(self.omega_rad_s);
         let rings = (RINGS / self.sectors as usize).max(1);
         let rings_per_px = rings as f32 / self.disc.radius_px.max(1.0);
-        let doubles = self.may_double();
+        // Nothing is learnt in the last round.
+        let doubles = self.may_double() && self.schedule.phase() < Phase::Last;
         // A sample of the events tells the tilt well enough.
         let tilts = self.tilt.is_some() && self.schedule.samples();
         let always_on = usize::from(window.ignores_polarity);
+        let asks_sides = self.schedule.asks_sides();
+        let sided = asks_sides || self.inverted.any();
+        let cells_per_px = sides::cells_per_px(self.disc.radius_px);
         let mut seen = Vec::new();
         for event in window.segment(self.segment).iter().step_by(stride) {
             if !event.is_of(one_of as u32) {
@@ -457,8 +481,13 @@ impl Pose {
             let (s, c) = angle.times(self.harmonic).sin_cos();
             let ring = ((quick_sqrt(r2) * rings_per_px) as usize).min(rings - 1);
             let sector = angle.sector(self.sectors) as usize;
-            let bank = (2 * (sector * rings + ring) + (usize::from(event.is_on()) | always_on))
-                .min(BANKS - 1);
+            let (mut cell, mut is_on) = (0, event.is_on());
+            if sided {
+                cell = sides::cell(x_px * cells_per_px, y_px * cells_per_px);
+                is_on = self.inverted.is_on(cell, is_on);
+            }
+            let polarity = usize::from(is_on) | always_on;
+            let bank = (2 * (sector * rings + ring) + polarity).min(BANKS - 1);
             sums.counts[bank] += 1;
             sums.low.add(bank, (s, c));
             if doubles {
@@ -467,14 +496,17 @@ impl Pose {
             let Some(phases) = &self.phases else { continue };
             let (re, im, weight) = phases[bank];
             let off = (s * re - c * im, c * re + s * im);
+            if asks_sides {
+                let (other_re, other_im, _) = phases[bank ^ 1];
+                sums.sides.add(cell, off.1, c * other_re + s * other_im);
+            }
             let per_r2 = 1.0 / r2;
             let (x, y) = (-y_px * per_r2, x_px * per_r2);
             let (sin_psi, cos_psi) = off;
             if tilts {
                 sums.tilt.add((x_px, y_px), per_r2, sin_psi);
             }
-            let t_us = t_us as f32;
-            seen.push(Seen { block: index, x, y, sin_psi, cos_psi, t_us, f, weight }).ok();
+            seen.push(Seen { block: index, x, y, sin_psi, cos_psi, f, weight }).ok();
             if seen.is_full() {
                 blocks::add(&mut sums.blocks, &mut seen);
             }

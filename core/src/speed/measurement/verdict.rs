@@ -235,6 +235,8 @@ impl Measurement {
     }
 
     /// Whether the rotor is also where it should be between whole periods, where an alias is not.
+    // Not inlined: it is called in two places.
+    #[inline(never)]
     pub(super) fn fits_between(&self) -> bool {
         // Where the parts were not counted, they are at least as many as the windings of the line.
         let parts = if self.parts.is_none() { self.windings.max(1) } else { 1 };

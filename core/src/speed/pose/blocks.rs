@@ -40,15 +40,14 @@ pub struct Seen {
     /// Its phase off the template.
     pub sin_psi: f32,
     pub cos_psi: f32,
-    /// Time since the middle of the window, and how far through the block that is.
-    pub t_us: f32,
+    /// How far through the block it lies.
     pub f: f32,
     /// What it weighs, which its phase holds already.
     pub weight: f32,
 }
 
 /// Events that are added at once.
-pub const SEEN_AT_ONCE: usize = 16;
+pub const SEEN_AT_ONCE: usize = 32;
 
 /// Adds events to their blocks, and forgets them.
 // Apart from where they are looked at, where registers are scarce: here a block's sums stay in them from event to event.
@@ -77,15 +76,14 @@ pub struct Block {
     /// The same, each event by how far through the block it lies.
     later: [f32; 3],
     in_step: f32,
-    time_us: f32,
     /// Sums of how far through the block the events lie, and of its square.
     way: [f32; 2],
 }
 
 impl Block {
-    /// Mean time of the events since the middle of the window.
-    pub fn middle_us(&self) -> f32 {
-        self.time_us / self.count.max(1.0)
+    /// How far through the block its events lie on average.
+    pub fn way(&self) -> f32 {
+        self.way[0] / self.count.max(1.0)
     }
 
     /// Number of events.
@@ -106,13 +104,12 @@ impl Block {
         right: [0.0; 3],
         later: [0.0; 3],
         in_step: 0.0,
-        time_us: 0.0,
         way: [0.0; 2],
     };
 
     #[inline]
     fn add(&mut self, seen: &Seen) {
-        let &Seen { x, y, sin_psi, cos_psi, t_us, f, weight, .. } = seen;
+        let &Seen { x, y, sin_psi, cos_psi, f, weight, .. } = seen;
         let (wx, wy) = (weight * x, weight * y);
         let (x_psi, y_psi, late) = (x * sin_psi, y * sin_psi, f * sin_psi);
         self.count += weight;
@@ -128,7 +125,6 @@ impl Block {
         self.later[1] += x * late;
         self.later[2] += y * late;
         self.in_step += cos_psi;
-        self.time_us += weight * t_us;
         let way = weight * f;
         self.way[0] += way;
         self.way[1] += way * f;
@@ -142,8 +138,7 @@ impl Block {
 
     /// Shares of the block's weight in the knot before it, between, and in the knot behind it: bursts of events lie anywhere.
     fn shares(&self) -> (f32, f32, f32) {
-        let per_event = 1.0 / self.count.max(1.0);
-        let (way, square) = (self.way[0] * per_event, self.way[1] * per_event);
+        let (way, square) = (self.way(), self.way[1] / self.count.max(1.0));
         (1.0 - 2.0 * way + square, way - square, square)
     }
 

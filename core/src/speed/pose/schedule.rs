@@ -30,11 +30,13 @@ pub struct Schedule {
     first_events: usize,
     share: usize,
     most_events: usize,
+    /// Whether to ask where polarities are the other way round.
+    sides: bool,
 }
 
 /// Most events of a rotor that was followed that are looked at: a PC keeps up with twenty readings a second of it.
 const MOST_FOLLOWED: usize = 65_536;
-/// Rounds of a later phase at most while each moves the path as far as one can.
+/// Rounds of a later phase at most while each moves the path far.
 const MOST_ROUNDS: u8 = 6;
 /// Blocks of the path in the first two phases.
 const FIRST_BLOCKS: usize = 12;
@@ -49,17 +51,20 @@ impl Schedule {
         first_events: 3_072,
         share: 1,
         most_events: usize::MAX,
+        sides: true,
     };
-    /// For a rotor that was followed in the window before: a third of the events tell it as well.
+    /// For a rotor that was followed in the window before: a third of the events tell it as well. A path that starts where it was is
+    /// not led astray by its sides.
     pub const KNOWN: Self = Self {
         most: [1, 0, 2, 1],
         first_events: 1_280,
         share: 3,
         most_events: MOST_FOLLOWED,
+        sides: false,
         ..Self::NEW
     };
     /// The same for one that a hand moved meanwhile, which is known by its parts alone.
-    pub const MOVED: Self = Self { most: [1, 1, 4, 1], ..Self::KNOWN };
+    pub const MOVED: Self = Self { most: [1, 1, 4, 1], sides: true, ..Self::KNOWN };
 
     /// The phase that the next round belongs to.
     pub const fn phase(&self) -> Phase {
@@ -71,9 +76,24 @@ impl Schedule {
         self.phase > Phase::Fine || self.phase == Phase::Fine && self.round > 0
     }
 
-    /// Whether the first of several rounds that look at all events is next: it learns the template anew.
+    /// Whether several rounds look at all events, as where little is known of the rotor, and the next is one of them.
+    pub fn learns(&self) -> bool {
+        self.phase == Phase::All && self.most[Phase::All as usize] > 1
+    }
+
+    /// Whether this round asks where polarities are the other way round: a sample of the events tells it once the rotor is known.
+    pub fn asks_sides(&self) -> bool {
+        self.sides && (self.samples() || self.learns())
+    }
+
+    /// Asks no more.
+    pub const fn ask_no_sides(&mut self) {
+        self.sides = false;
+    }
+
+    /// Whether the first of these is next: it learns the template anew.
     pub fn reaches_out(&self) -> bool {
-        self.phase == Phase::All && self.round == 0 && self.most[Phase::All as usize] > 1
+        self.learns() && self.round == 0
     }
 
     /// The template has to be learnt anew: the last phase that corrects the path begins again, if it has begun.

@@ -115,8 +115,8 @@ impl Pose {
         let middle_us = 0.5 * unsettled_us;
         let half_us = 0.5 * self.window_us - middle_us;
         let mut points = Vec::<Point, MAX_KNOTS>::new();
-        for block in sums.blocks.iter().take(count) {
-            let t_us = block.middle_us();
+        for (index, block) in sums.blocks.iter().enumerate().take(count) {
+            let t_us = self.path.time_us(index, block.way());
             let (off_rad, weight) = block.turn_rad(self.harmonic as f32).unwrap_or_default();
             let y = self.path.at(t_us).turn_rad + off_rad;
             let u = (t_us - middle_us) / half_us;
