@@ -5,6 +5,7 @@
 //! Which windows are measured depends on speed only when a measurement takes longer than the spare segments last:
 //! then all that came meanwhile is the next window, thinned so that it finds room.
 
+mod beside;
 mod conclude;
 mod gate;
 mod intake;
@@ -95,6 +96,9 @@ pub struct Tachometer<'m> {
     /// How far the search beside the rotors has got that is spread over readings.
     round: Round,
     stretch: Stretch,
+    beside: Beside,
+    /// Whether a search of all of the image, but for what is followed, began in this window.
+    searched: bool,
     /// When the window begins anew, in microseconds; until then none is measured.
     anew_us: Option<u64>,
 }
@@ -109,6 +113,18 @@ enum Stretch {
     Blind,
     /// It was begun short again, and none but a longest one has been locked since.
     Tried,
+}
+
+/// What moves beside the rotors, all of which are locked.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+enum Beside {
+    /// Nothing, or it was not asked yet.
+    #[default]
+    Nothing,
+    /// Something, and the window grows to see whether it turns slowly, from so many microseconds on.
+    LookedAt(f32),
+    /// What has been looked at. Windows are as long as the rotors want them.
+    Known,
 }
 
 impl<'m> Tachometer<'m> {
@@ -147,6 +163,8 @@ impl<'m> Tachometer<'m> {
             until_search: 0,
             round: Round::default(),
             stretch: Stretch::default(),
+            beside: Beside::default(),
+            searched: false,
             anew_us: None,
         }
     }
@@ -158,6 +176,7 @@ impl<'m> Tachometer<'m> {
         self.heat.resize(settings.geometry);
         self.tracker = Tracker::default();
         self.stretch = Stretch::default();
+        self.beside = Beside::default();
         self.store.forget_roll();
         self.started = false;
         self.window_segments = 0;

@@ -2,8 +2,10 @@
 
 use heapless::Vec;
 
-use super::{BASE_WINDOW_US, Job, LONGEST_WINDOW_US, Stretch, Tachometer, segment_us};
+use super::beside::GROWTH;
+use super::{BASE_WINDOW_US, Beside, Job, LONGEST_WINDOW_US, Stretch, Tachometer, segment_us};
 use crate::limits::MAX_ROTORS;
+use crate::math::larger;
 use crate::order::sort_few;
 use crate::reading::{Evidence, Frame, Reading, Reason, RotorReading, Status};
 use crate::rotors::Disc;
@@ -22,12 +24,25 @@ const WINDOWS_US: [u32; 9] = [
     1_600_000,
     LONGEST_WINDOW_US,
 ];
+/// A window may be as much shorter than what is wanted.
+pub(super) const ENOUGH: f32 = 1.02;
 /// Readings until the whole image is searched again, while a rotor is in view that is not locked.
 const SEARCH_AGAIN: u8 = 2;
 /// Fewest events in a window that are looked at.
 const LEAST_EVENTS: u64 = 300;
 /// Share of events lost beyond which the rest is not trusted.
 const MOST_LOST: f32 = 0.5;
+
+/// How long a window rotors want, in microseconds.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Wants {
+    /// Longest that any wants, that any wants that is not locked, and that any wants that has a speed.
+    pub all_us: f32,
+    pub unlocked_us: f32,
+    pub read_us: f32,
+    /// Whether all are locked.
+    pub all_locked: bool,
+}
 
 impl Tachometer<'_> {
     /// Turns the outcomes into a reading and moves the window on. None comes of a window in which it was only caught up with what came
@@ -84,11 +99,16 @@ impl Tachometer<'_> {
             self.fade(WINDOW_SEGMENTS);
         }
         let locked = status == Some(Status::Locked);
-        let window_us = segment_us(self.target_us) * WINDOW_SEGMENTS as u32;
+        let window_us = (segment_us(self.target_us) * WINDOW_SEGMENTS as u32) as f32;
+        let adapts = self.settings.window_us.is_none();
+        let longest = segment_us(self.target_us) >= segment_us(LONGEST_WINDOW_US);
+        let short_again =
+            adapts && status.is_some() && self.look_beside(window_us, locked, longest);
+        let looks_beside = matches!(self.beside, Beside::LookedAt(_));
+        let wants = self.wants();
         // Not where another rotor would have been read in a longer one.
-        let wants_more = |o: &Outcome| o.status != Status::Locked && o.wanted_us > window_us as f32;
-        self.satisfied = locked && !self.outcomes.iter().any(wants_more);
-        if self.outcomes.iter().any(|outcome| outcome.status != Status::Locked) {
+        self.satisfied = locked && !looks_beside && wants.unlocked_us <= window_us;
+        if !wants.all_locked {
             self.until_search = self.until_search.min(SEARCH_AGAIN);
         }
         if self.overrun {
@@ -102,21 +122,24 @@ impl Tachometer<'_> {
             self.ignored.overrun += self.store.restart(self.last_us, segment_us);
             return;
         }
-        let mut wanted = self.outcomes.iter().map(|o| o.wanted_us).fold(0.0, f32::max);
+        let mut wanted = wants.all_us;
         let refused = status.and_then(Status::reason).is_some();
         if refused && !caught_up {
-            wanted = wanted.max(1.5 * window_us as f32);
+            wanted = larger(wanted, 1.5 * window_us);
         }
-        let adapts = self.settings.window_us.is_none();
-        let longest = segment_us(self.target_us) >= segment_us(LONGEST_WINDOW_US);
-        let too_long =
-            adapts && goes_on && status.is_some_and(|status| self.is_too_long(status, longest));
-        if too_long {
+        if looks_beside {
+            wanted = larger(wanted, GROWTH * window_us);
+        }
+        let too_long = short_again
+            || adapts && goes_on && status.is_some_and(|status| self.is_too_long(status, longest));
+        if too_long && !goes_on {
+            self.target_us = BASE_WINDOW_US;
+        } else if too_long {
             // As late as measuring it may end without anything given up, so that nothing depends on when it did.
             let last = self.store.spare() as u64;
             let end_us = self.store.start_us() + last * u64::from(self.store.segment_us());
             self.anew_us = Some(end_us);
-        } else if adapts && wanted > window_us as f32 * 1.02 && !longest {
+        } else if adapts && wanted > ENOUGH * window_us && !longest {
             let longer = WINDOWS_US.iter().find(|w| **w as f32 >= wanted);
             self.target_us = longer.copied().unwrap_or(LONGEST_WINDOW_US);
             if self.store.segment_us() < segment_us(self.target_us) {
@@ -140,10 +163,8 @@ impl Tachometer<'_> {
         match status {
             Status::Locked if !longest => self.stretch = Stretch::Wanted,
             Status::Locked if self.stretch == Stretch::Blind => {
-                let does_with_less = |o: &Outcome| {
-                    o.status == Status::Locked && o.wanted_us <= BASE_WINDOW_US as f32
-                };
-                if self.outcomes.iter().all(does_with_less) {
+                let Wants { all_locked, all_us, .. } = self.wants();
+                if all_locked && all_us <= BASE_WINDOW_US as f32 {
                     self.stretch = Stretch::Tried;
                     return true;
                 }
@@ -154,6 +175,23 @@ impl Tachometer<'_> {
             _ => {}
         }
         false
+    }
+
+    /// What the rotors of the window want.
+    #[inline(never)]
+    pub(super) fn wants(&self) -> Wants {
+        let mut wants = Wants { all_locked: true, ..Wants::default() };
+        for Outcome { status, wanted_us, .. } in &self.outcomes {
+            wants.all_us = larger(wants.all_us, *wanted_us);
+            if *status != Status::Locked {
+                wants.all_locked = false;
+                wants.unlocked_us = larger(wants.unlocked_us, *wanted_us);
+            }
+            if status.reason().is_none() {
+                wants.read_us = larger(wants.read_us, *wanted_us);
+            }
+        }
+        wants
     }
 
     fn fade(&mut self, segments: usize) {

@@ -21,6 +21,7 @@ impl Tachometer<'_> {
         self.outcomes.clear();
         self.in_step_hz = None;
         self.lost = false;
+        self.searched = false;
         self.ignores_polarity = false;
         let known = self.tracker.known().iter().filter(|known| known.can_be_followed());
         for known in known {
@@ -36,8 +37,7 @@ impl Tachometer<'_> {
         }
         if searches {
             // What is locked is followed: measuring it afresh takes a PC twenty times as long.
-            self.until_search = self.rhythm.search_every;
-            self.search(Extraction::default());
+            self.search_all();
             return;
         }
         for found in self.tracker.known().iter().filter_map(Known::told) {
@@ -52,6 +52,8 @@ impl Tachometer<'_> {
             self.until_search -= 1;
         }
         if self.rhythm.searches_beside() {
+            // All of it, in parts: once a round is often enough to ask what moves there.
+            self.searched = self.round.begins();
             self.search(Extraction::go_on(self.round));
         } else {
             self.measure_next(0);
@@ -62,8 +64,15 @@ impl Tachometer<'_> {
     // Not inlined: it is called in two places.
     #[inline(never)]
     fn search_anew(&mut self) {
-        self.until_search = self.rhythm.search_every;
         self.candidates.clear();
+        self.search_all();
+    }
+
+    // Nor this.
+    #[inline(never)]
+    fn search_all(&mut self) {
+        self.until_search = self.rhythm.search_every;
+        self.searched = true;
         self.search(Extraction::default());
     }
 

@@ -17,6 +17,13 @@ pub struct Round {
     quarter_looks: u8,
 }
 
+impl Round {
+    /// Whether nothing of it has been searched yet.
+    pub const fn begins(&self) -> bool {
+        self.quarter == 0 && self.looks == 0
+    }
+}
+
 impl Extraction {
     /// The next part of a search that goes on where another ended.
     pub fn go_on(round: Round) -> Self {
