@@ -318,6 +318,34 @@ fn one_locked_while_another_is_too_fast() {
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
 }
 
+/// A path has 63 blocks, each of whole periods: of 64 to 94 in the window, and of 126 to 157, all must find room in them.
+#[test]
+fn a_hand_is_followed_to_the_end_however_many_blades_pass() {
+    let mut wrong = Vec::new();
+    for (blades, rpm) in [(2, 15_000.0), (3, 10_000.0), (6, 4_600.0), (3, -18_000.0)] {
+        let rotor = Rotor { blades, ..at(170.0, 130.0, 50.0, rpm) };
+        let scene = Scene { camera: hand(), background: wall(), ..scene(77, vec![rotor]) };
+        for capacity in Capacity::ALL {
+            let name = format!("{blades} blades, {} memory", capacity.as_str());
+            let measured = run(&scene, capacity);
+            wrong.extend(measured.beyond_sigma(&name));
+            let rotors = measured.readings.iter().flat_map(|reading| &reading.rotors);
+            for share in
+                rotors.filter_map(|rotor| Some(rotor.speed?.rpm_sigma() / rotor.speed?.rpm()))
+            {
+                show(&format!("{name}, {rpm} rpm: sigma {:.3} permille", 1e3 * share));
+                if share > 3e-4 {
+                    wrong.push(format!("{name}: {rpm:+.0} rpm to {:.2} permille", 1e3 * share));
+                }
+            }
+            if measured.readings.iter().any(|reading| reading.status != Status::Locked) {
+                wrong.push(format!("{name}: {rpm:+.0} rpm: not locked in all readings"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+}
+
 /// A hand moves the axis by as much as tells one harmonic from the next: the right speed, or none.
 #[test]
 fn small_rotors_with_many_blades_in_a_trembling_hand() {

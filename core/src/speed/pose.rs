@@ -44,6 +44,8 @@ const LEAST_BLOCKS: usize = 12;
 const SHORTEST_BLOCK_US: f32 = 3_000.0;
 /// Most blocks in a symmetry period.
 const MOST_IN_PERIOD: f32 = 12.0;
+/// Most blocks that a path of all knots has: a last one may be a quarter longer.
+const MOST_PERIODS: f32 = MAX_KNOTS as f32 - 0.75;
 /// Highest angular harmonic.
 const MOST_HARMONIC: u32 = 96;
 /// A doubled harmonic must keep this share of the events in step that were so at first.
@@ -439,7 +441,9 @@ impl Pose {
         let step_us = if split >= 1.0 {
             self.period_us / split
         } else {
-            self.period_us * crate::math::round(shortest / self.period_us).max(1.0)
+            // Rounded down, more blocks than there are knots would be needed, and the last would be the rest of the window.
+            let least = crate::math::ceil(self.window_us / (self.period_us * MOST_PERIODS));
+            self.period_us * larger(crate::math::round(shortest / self.period_us), least)
         };
         self.in_period = split as usize;
         let blocks = crate::math::ceil(self.window_us / step_us - 0.25) as usize;
