@@ -141,6 +141,8 @@ pub struct Pose {
     /// Segment of the window that is looked at next.
     segment: usize,
     slope: Option<Slope>,
+    /// Whether the trend of what pixels told once they had settled is to come.
+    trending: bool,
 }
 
 impl Pose {
@@ -184,6 +186,7 @@ impl Pose {
             schedule: Schedule::NEW,
             segment: 0,
             slope: None,
+            trending: false,
         }
     }
 
@@ -314,8 +317,18 @@ impl Pose {
             self.segment += 1;
             return false;
         }
+        if core::mem::take(&mut self.trending) {
+            self.slope = self.settled_trend(sums);
+        } else if !self.end_round(sums) {
+            self.segment = 0;
+            return false;
+        } else if self.unsettled_us > 0.0 {
+            // A second trend is as much work again: a step of its own.
+            self.trending = true;
+            return false;
+        }
         self.segment = 0;
-        self.end_round(sums)
+        self.end()
     }
 
     /// Corrects the path by what a round saw; `true` when it was the last.
@@ -336,15 +349,7 @@ impl Pose {
         }
         self.sift(sums);
         if self.schedule.phase() == Phase::Last {
-            self.slope = self.trend(sums);
-            if self.slope.is_none() && self.harmonic > self.first_harmonic {
-                // Too few blocks are in step, or the path slipped.
-                self.halve(true);
-                return false;
-            }
-            let (x_px, y_px) = self.path.centre();
-            self.disc.x_px += x_px;
-            self.disc.y_px += y_px;
+            self.slope = self.trend_after(0.0, sums);
             return true;
         }
         let mut moved_px = f32::MAX;
@@ -404,6 +409,19 @@ impl Pose {
             }
         }
         false
+    }
+
+    /// Takes the trend for the answer; `false` where there is none, and a lower harmonic may give one.
+    fn end(&mut self) -> bool {
+        if self.slope.is_none() && self.harmonic > self.first_harmonic {
+            // Too few blocks are in step, or the path slipped.
+            self.halve(true);
+            return false;
+        }
+        let (x_px, y_px) = self.path.centre();
+        self.disc.x_px += x_px;
+        self.disc.y_px += y_px;
+        true
     }
 
     /// Whether blocks are as long as few events make them.

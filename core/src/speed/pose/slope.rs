@@ -86,17 +86,13 @@ impl Pose {
         if window.is_first() && small { unsettled_us } else { 0.0 }
     }
 
-    /// The trend of the turn through the blocks, and how the axis wanders; `None` when too few blocks tell, or the path
-    /// has slipped.
-    ///
-    /// What pixels tell before they have settled is believed where the rest bears it out and it tells more.
-    pub(super) fn trend(&self, sums: &Sums) -> Option<Slope> {
-        let all = self.trend_after(0.0, sums);
-        if self.unsettled_us <= 0.0 {
-            return all;
-        }
+    /// The trend of the turn, where pixels may not have settled at first: what they tell meanwhile is believed where the rest bears it out
+    /// and it tells more. [`Self::slope`] is the trend through all blocks.
+    pub(super) fn settled_trend(&self, sums: &Sums) -> Option<Slope> {
         let settled = self.trend_after(self.unsettled_us, sums);
-        let (Some(all), Some(settled)) = (all, settled) else { return all.or(settled) };
+        let (Some(all), Some(settled)) = (self.slope, settled) else {
+            return self.slope.or(settled);
+        };
         let off_rad_s = (all.speed.omega_rad_s - settled.speed.omega_rad_s).abs();
         let sigma_rad_s = settled.speed.sigma_rad_s;
         // A hand did something meanwhile.
@@ -106,10 +102,11 @@ impl Pose {
         Some(if as_exact || off_rad_s > sigmas * sigma_rad_s { settled } else { all })
     }
 
-    /// The trend of what came later than so long after the window's start, as if all before went on as it did.
+    /// The trend of what came later than so long after the window's start, as if all before went on as it did, and how the axis wanders;
+    /// `None` when too few blocks tell, or the path has slipped.
     // Not inlined: it is called twice.
     #[inline(never)]
-    fn trend_after(&self, unsettled_us: f32, sums: &Sums) -> Option<Slope> {
+    pub(super) fn trend_after(&self, unsettled_us: f32, sums: &Sums) -> Option<Slope> {
         let count = self.path.blocks();
         let periods = count / self.in_period.max(1);
         let middle_us = 0.5 * unsettled_us;
