@@ -2,6 +2,7 @@
 
 use evtach_core::{Direction, Geometry, Reading, RotorReading};
 use evtach_host::measure::Capacity;
+use evtach_host::synth::presets::Preset;
 use evtach_host::synth::{Motion, Rotor, Scene, generate};
 use evtach_tests::{Loaded, measure, show};
 
@@ -211,6 +212,26 @@ fn a_motor_that_hunts_strongly() {
         let rotor = Rotor { rpm, blades, hunting, hunting_hz, ..Rotor::default() };
         let name = format!("{rpm} rpm, {} % at {hunting_hz} Hz", 100.0 * hunting);
         check(&name, &scene(seed, vec![rotor]), false);
+    }
+}
+
+/// Windows grow once to see whether what moves beside a motor turns. One that speeds up is then not locked, which is no refusal: the
+/// next short window tells, and from then on readings come as often as without.
+#[test]
+fn what_walks_beside_a_motor_that_speeds_up_does_not_stop_its_readings() {
+    let rotor = Rotor { rpm: 1800.0, ramp_per_s: 0.05, x_px: 90.0, ..Rotor::default() };
+    let movers = Preset::Walker.scene().movers;
+    let scene = Scene { movers, duration_ms: 4_500.0, ..scene(97, vec![rotor]) };
+    for capacity in Capacity::ALL {
+        let series = series("beside a walker", &scene, capacity);
+        let told = &series.rotors[0];
+        assert_eq!(told.len(), series.readings, "no reading is refused");
+        let late = told.iter().filter(|told| told.t_us > 3_500_000).count();
+        show(&format!("{}: {} readings, {late} after 3.5 s", series.name, told.len()));
+        // A second, less half a window.
+        assert!(late >= if capacity == Capacity::Full { 17 } else { 8 }, "{late} readings");
+        let wrong = series.check();
+        assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
     }
 }
 

@@ -49,6 +49,11 @@ impl Tachometer<'_> {
         false
     }
 
+    /// Whether the window is longer than what is locked wants it.
+    pub(super) const fn looks_beside(&self) -> bool {
+        matches!(self.beside, Beside::LookedAt(_))
+    }
+
     /// Whether some patch beside the rotors is dense with events. Cost: about 25 instructions a cell.
     #[inline(never)]
     fn moves_beside(&self) -> bool {

@@ -3,7 +3,7 @@
 use heapless::Vec;
 
 use super::beside::GROWTH;
-use super::{BASE_WINDOW_US, Beside, Job, LONGEST_WINDOW_US, Stretch, Tachometer, segment_us};
+use super::{BASE_WINDOW_US, Job, LONGEST_WINDOW_US, Stretch, Tachometer, segment_us};
 use crate::limits::MAX_ROTORS;
 use crate::math::larger;
 use crate::order::sort_few;
@@ -46,7 +46,8 @@ pub(super) struct Wants {
 
 impl Tachometer<'_> {
     /// Turns the outcomes into a reading and moves the window on. None comes of a window in which it was only caught up with what came
-    /// while another was measured, and what is followed was not to be seen: that is sparser, and the next one tells.
+    /// while another was measured, and what is followed was not to be seen: that is sparser, and the next one tells. Nor of one that is
+    /// long to look beside what is locked, and loses that.
     pub(super) fn conclude(&mut self) -> Option<Reading> {
         if core::mem::take(&mut self.lost) {
             self.outcomes.clear();
@@ -77,8 +78,10 @@ impl Tachometer<'_> {
         } else {
             best_status(&rotors, self.in_step_hz)
         };
+        // What was locked and does not lock in a window that is long for the sake of something else is told by the next short one.
+        let lost_to_look = self.looks_beside() && status != Status::Locked;
         self.move_on(Some(status));
-        Some(Reading {
+        (!lost_to_look).then_some(Reading {
             t_us: start_us + u64::from(window_us / 2),
             window_us,
             events: account.counted,
@@ -104,10 +107,13 @@ impl Tachometer<'_> {
         let longest = segment_us(self.target_us) >= segment_us(LONGEST_WINDOW_US);
         let short_again =
             adapts && status.is_some() && self.look_beside(window_us, locked, longest);
-        let looks_beside = matches!(self.beside, Beside::LookedAt(_));
+        let looks_beside = self.looks_beside();
         let wants = self.wants();
         // Not where another rotor would have been read in a longer one.
         self.satisfied = locked && !looks_beside && wants.unlocked_us <= window_us;
+        if short_again {
+            self.target_us = BASE_WINDOW_US;
+        }
         if !wants.all_locked {
             self.until_search = self.until_search.min(SEARCH_AGAIN);
         }
@@ -132,14 +138,12 @@ impl Tachometer<'_> {
         }
         let too_long = short_again
             || adapts && goes_on && status.is_some_and(|status| self.is_too_long(status, longest));
-        if too_long && !goes_on {
-            self.target_us = BASE_WINDOW_US;
-        } else if too_long {
+        if too_long && goes_on {
             // As late as measuring it may end without anything given up, so that nothing depends on when it did.
             let last = self.store.spare() as u64;
             let end_us = self.store.start_us() + last * u64::from(self.store.segment_us());
             self.anew_us = Some(end_us);
-        } else if adapts && wanted > ENOUGH * window_us && !longest {
+        } else if adapts && !too_long && wanted > ENOUGH * window_us && !longest {
             let longer = WINDOWS_US.iter().find(|w| **w as f32 >= wanted);
             self.target_us = longer.copied().unwrap_or(LONGEST_WINDOW_US);
             if self.store.segment_us() < segment_us(self.target_us) {
