@@ -141,15 +141,15 @@ impl Grid {
         let (left, right) = (column.wrapping_sub(ring), column + ring);
         let (first, last) = (row.wrapping_sub(ring), row + ring);
         for y in row.saturating_sub(ring)..(last + 1).min(SIDE) {
-            // All of the first row and of the last, of the others their two ends.
-            let spans = if y == first || y == last {
-                [(if left < SIDE { left } else { 0 }, right.min(SIDE - 1)), (SIDE, SIDE)]
+            if y == first || y == last {
+                let left = if left < SIDE { left } else { 0 };
+                self.visit(query, bank + y, (left, right.min(SIDE - 1)), best);
             } else {
-                [(left, left), (right, right)]
-            };
-            for (from, to) in spans {
-                if from < SIDE {
-                    self.visit(query, bank + y, (from, to), best);
+                if left < SIDE {
+                    self.visit(query, bank + y, (left, left), best);
+                }
+                if right < SIDE {
+                    self.visit(query, bank + y, (right, right), best);
                 }
             }
         }
