@@ -1,137 +1,15 @@
 //! Where rotors stand and what else is in the picture: each scene is measured in both memories against its truth.
 #![allow(clippy::panic)] // A test fails by it.
 
-use evtach_core::{Direction, Event, Geometry, Reading, Reason, RotorReading, Status};
+mod measured;
+
+use evtach_core::{Event, Geometry, Reading, Reason, Status};
 use evtach_host::measure::Capacity;
 use evtach_host::synth::presets::{Preset, hand, shaken, wall};
 use evtach_host::synth::scene::{Background, Camera, Lamp, Sensor, Shape, Vibration};
-use evtach_host::synth::{Model, Rotor, Scene, Truth, generate};
+use evtach_host::synth::{Model, Rotor, Scene, generate};
 use evtach_tests::{Loaded, measure, show};
-
-/// Largest relative error of a speed.
-const LARGEST_ERROR: f64 = 0.01;
-/// The same in standard errors, where they are asked for.
-const LARGEST_ERROR_SIGMA: f64 = 4.0;
-
-/// A scene's readings.
-struct Measured {
-    truth: Truth,
-    readings: Vec<Reading>,
-}
-
-fn run(scene: &Scene, capacity: Capacity) -> Measured {
-    let made = generate(scene).expect("a scene in range");
-    let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
-    let (readings, _) = measure(&Loaded { geometry, events: made.events }, capacity);
-    Measured { truth: made.truth, readings }
-}
-
-/// Signed speed of a reading in rpm.
-fn rpm(rotor: &RotorReading) -> Option<f64> {
-    let speed = rotor.speed?;
-    let sign = if speed.direction() == Direction::Cw { 1.0 } else { -1.0 };
-    Some(sign * f64::from(speed.rpm()))
-}
-
-impl Measured {
-    /// The last reading of a rotor of the scene that has a speed.
-    fn of(&self, number: usize) -> Option<&RotorReading> {
-        let truth = &self.truth.rotors[number];
-        let near = |rotor: &&RotorReading| {
-            let dx = f64::from(rotor.x_px) - truth.centre_px[0];
-            let dy = f64::from(rotor.y_px) - truth.centre_px[1];
-            dx.hypot(dy) < 0.5 * truth.radius_px
-        };
-        let last = |reading: &Reading| reading.rotors.iter().any(|r| near(&r) && r.speed.is_some());
-        let reading = self.readings.iter().rev().find(|reading| last(reading))?;
-        reading.rotors.iter().filter(near).find(|rotor| rotor.speed.is_some())
-    }
-
-    /// What is wrong with the speeds of all rotors; a rotor without one is wrong where `all` are owed.
-    fn wrong_speeds(&self, name: &str, all: bool) -> Vec<String> {
-        let mut wrong = Vec::new();
-        for (number, truth) in self.truth.rotors.iter().enumerate() {
-            let expected = truth.rpm_camera_mean_signed;
-            match self.of(number).and_then(rpm) {
-                Some(read) if (read / expected - 1.0).abs() <= LARGEST_ERROR => {}
-                Some(read) => wrong.push(format!("{name}: {expected:+.1} rpm read as {read:+.1}")),
-                None if all => wrong.push(format!("{name}: {expected:+.1} rpm: no speed")),
-                None => {}
-            }
-        }
-        let speeds = self.readings.iter().flat_map(|reading| &reading.rotors).filter_map(rpm);
-        for read in speeds {
-            let known = self.truth.rotors.iter().any(|truth| {
-                (read / truth.rpm_camera_mean_signed - 1.0).abs() <= 5.0 * LARGEST_ERROR
-            });
-            if !known {
-                wrong.push(format!("{name}: {read:+.1} rpm, which nothing turns at"));
-            }
-        }
-        wrong
-    }
-
-    /// Speeds farther from that of the scene's one rotor than their own standard errors allow.
-    fn beyond_sigma(&self, name: &str) -> Vec<String> {
-        let expected = self.truth.rotors[0].rpm_camera_mean_signed;
-        let rotors = self.readings.iter().flat_map(|reading| &reading.rotors);
-        let off = |rotor: &RotorReading| {
-            let (read, sigma) = (rpm(rotor)?, f64::from(rotor.speed?.rpm_sigma()));
-            let far = (read - expected).abs() > LARGEST_ERROR_SIGMA * sigma;
-            far.then(|| format!("{name}: {expected:+.3} rpm read as {read:+.3} +/- {sigma:.3}"))
-        };
-        rotors.filter_map(off).collect()
-    }
-
-    /// What is wrong where the first rotor is to be locked and the second, in the same reading, refused for one of these reasons.
-    fn wrong_beside_refused(&self, name: &str, due: impl Fn(Reason) -> bool) -> Vec<String> {
-        let mut wrong = self.wrong_speeds(name, false);
-        if self.of(0).is_none_or(|rotor| rotor.status != Status::Locked) {
-            wrong.push(format!("{name}: the first rotor is not locked"));
-        }
-        if let Some(rpm) = self.of(1).and_then(rpm) {
-            wrong.push(format!("{name}: the second rotor is read as {rpm:+.1} rpm"));
-        }
-        let refused = |rotor: &RotorReading| {
-            let [x_px, y_px] = self.truth.rotors[1].centre_px;
-            let away_px = (f64::from(rotor.x_px) - x_px).hypot(f64::from(rotor.y_px) - y_px);
-            away_px < 30.0 && rotor.status.reason().is_some_and(&due)
-        };
-        let both = |reading: &Reading| {
-            reading.status == Status::Locked && reading.rotors.iter().any(refused)
-        };
-        if !self.readings.iter().any(both) {
-            wrong.push(format!("{name}: no reading tells both: {:?}", self.readings));
-        }
-        wrong
-    }
-}
-
-/// Every rotor with its right speed, in both memories.
-fn all_read(name: &str, scene: &Scene) {
-    let wrong: Vec<String> = Capacity::ALL
-        .into_iter()
-        .flat_map(|capacity| {
-            let name = format!("{name}, {} memory", capacity.as_str());
-            let wrong = run(scene, capacity).wrong_speeds(&name, true);
-            show(&format!("{name}: {} wrong", wrong.len()));
-            wrong
-        })
-        .collect();
-    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
-}
-
-fn at(x_px: f64, y_px: f64, radius_px: f64, rpm: f64) -> Rotor {
-    Rotor { x_px, y_px, radius_px, rpm, ..Rotor::default() }
-}
-
-fn scene(seed: u64, rotors: Vec<Rotor>) -> Scene {
-    Scene { seed, rotors, duration_ms: 210.0, ..Scene::default() }
-}
-
-fn wide(seed: u64, rotors: Vec<Rotor>) -> Scene {
-    Scene { width_px: 640, height_px: 480, ..scene(seed, rotors) }
-}
+use measured::{all_read, at, rpm, run, scene, wide};
 
 #[test]
 fn a_busy_background_from_the_hand() {
