@@ -16,7 +16,7 @@ mod work;
 use heapless::Vec;
 
 use crate::limits::{MAX_ROTORS, MAX_SUSPECTS, POLAR_EVENTS};
-use crate::rotors::extraction::{Extraction, Round};
+use crate::rotors::extraction::{Extraction, InStep, Round};
 use crate::rotors::{Found, HeatMap, Spectrum};
 use crate::settings::{Ignored, Memory, More, Settings};
 use crate::speed::measurement::{Measurement, Outcome};
@@ -85,7 +85,7 @@ pub struct Tachometer<'m> {
     scratch: &'m mut Scratch,
     candidates: Vec<Suspect, MAX_SUSPECTS>,
     outcomes: Vec<Outcome, MAX_ROTORS>,
-    in_step_hz: Option<f32>,
+    in_step: Option<InStep>,
     /// Whether a rotor that is followed was not locked in this window.
     lost: bool,
     /// Whether polarity is ignored in what is searched and found, as the window showed nothing sure with it.
@@ -109,9 +109,9 @@ enum Stretch {
     /// It is as long as the rotors wanted it.
     #[default]
     Wanted,
-    /// A longest window was refused: what has come into view since may do with less.
-    Blind,
-    /// It was begun short again, and none but a longest one has been locked since.
+    /// It grew while nothing turned, and so many longest ones were refused since: what has come into view may do with less.
+    Blind(u8),
+    /// It was begun short again for that, and none was locked yet, or longest ones alone.
     Tried,
 }
 
@@ -156,7 +156,7 @@ impl<'m> Tachometer<'m> {
             scratch,
             candidates: Vec::new(),
             outcomes: Vec::new(),
-            in_step_hz: None,
+            in_step: None,
             lost: false,
             ignores_polarity: false,
             tracker: Tracker::default(),

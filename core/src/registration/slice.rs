@@ -4,7 +4,7 @@ use heapless::Vec;
 
 use crate::limits::SLICE_POINTS;
 use crate::speed::path::Moving;
-use crate::store::{StoredEvent, Window};
+use crate::store::Window;
 
 /// One event of a slice.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -44,23 +44,26 @@ impl Cut {
     /// Collects the slice, evenly thinned to the most.
     pub fn collect(&self, window: &Window<'_>, disc: &Moving<'_>, slice: &mut Slice) {
         slice.clear();
-        let stretch = |fold: u32| {
-            let start_us = self.start_us + fold as f32 * self.period_us;
-            (start_us, window.between(start_us as i32, (start_us + self.length_us) as i32))
-        };
-        let inside = |event: &StoredEvent| disc.place(*event).is_some();
-        let total: usize = (0..self.folds).map(|fold| stretch(fold).1.filter(inside).count()).sum();
-        let (mut index, mut next) = (0, 0);
-        for fold in 0..self.folds {
-            let (start_us, events) = stretch(fold);
-            for event in events {
-                let Some((x_px, y_px, _)) = disc.place(event) else { continue };
-                if index * self.most >= next {
-                    let tau_s = (event.since(window.start_us) as f32 - start_us) * 1e-6;
-                    slice.push(SlicePoint { x_px, y_px, tau_s, on: window.is_on(event) }).ok();
-                    next += total.max(self.most);
+        let mut total = 0;
+        // Counted first, in the same loop: flash is short.
+        for counts in [true, false] {
+            let (mut index, mut next) = (0, 0);
+            for fold in 0..self.folds {
+                let start_us = self.start_us + fold as f32 * self.period_us;
+                let end_us = start_us + self.length_us;
+                for event in window.between(start_us as i32, end_us as i32) {
+                    let Some((x_px, y_px, _)) = disc.place(event) else { continue };
+                    if counts {
+                        total += 1;
+                        continue;
+                    }
+                    if index * self.most >= next {
+                        let tau_s = (event.since(window.start_us) as f32 - start_us) * 1e-6;
+                        slice.push(SlicePoint { x_px, y_px, tau_s, on: window.is_on(event) }).ok();
+                        next += total.max(self.most);
+                    }
+                    index += 1;
                 }
-                index += 1;
             }
         }
     }

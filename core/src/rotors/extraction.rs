@@ -108,6 +108,7 @@ enum Stage {
     Apart,
     Part,
     Moving,
+    Fast,
     Heat,
     Track,
     Sweep,
@@ -121,6 +122,7 @@ enum For {
     #[default]
     Whole,
     Part,
+    Fast,
     Slow,
 }
 
@@ -200,7 +202,16 @@ pub struct Extraction {
     swept: Option<Disc>,
     /// Rotors by every line: the same one may stand here twice.
     candidates: Vec<Candidate, MAX_CANDIDATES>,
-    in_step_hz: Option<f32>,
+    in_step: Option<InStep>,
+}
+
+/// What keeps step with a frequency, and is no rotor that can be measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum InStep {
+    /// All that is seen at once, at this frequency in Hz: a lamp.
+    AllOver(f32),
+    /// Blades that pass more often than they are followed.
+    TooFast,
 }
 
 /// Memory that an extraction works in.
@@ -260,7 +271,8 @@ impl Extraction {
             Stage::Split => self.split(view),
             Stage::Apart => self.apart(view),
             Stage::Part => self.part(scratch),
-            Stage::Moving => self.moving(view, scratch),
+            Stage::Moving => self.moving(view, spectrum, scratch),
+            Stage::Fast => self.fast(scratch),
             Stage::Heat => self.heat(view, scratch),
             Stage::Track => self.track(view, track),
             Stage::Sweep => self.sweep(view, track),
@@ -275,7 +287,7 @@ impl Extraction {
     pub const fn stage(&self) -> &'static str {
         match self.stage {
             Stage::Visits => "visits",
-            Stage::Lags | Stage::Spectrum => "spectrum",
+            Stage::Lags | Stage::Spectrum | Stage::Fast => "spectrum",
             Stage::Line | Stage::Map | Stage::Judge | Stage::Seed | Stage::Around => "map",
             Stage::Size | Stage::Fill | Stage::Collect => "coherence",
             Stage::Events | Stage::Whole | Stage::Part | Stage::Slow => "winding",
@@ -292,10 +304,10 @@ impl Extraction {
         &self.candidates
     }
 
-    /// Frequency in Hz of the strongest line that was in step all over: a lamp.
+    /// What keeps step beside them, by the strongest line of such.
     #[must_use]
-    pub const fn in_step_hz(&self) -> Option<f32> {
-        self.in_step_hz
+    pub const fn in_step(&self) -> Option<InStep> {
+        self.in_step
     }
 
     // Not inlined: it is called in eight places.

@@ -1,6 +1,7 @@
 //! The frequencies at which the cells of the image are visited, from their summed autocorrelation.
 
 use heapless::Vec;
+use microfft::Complex32;
 
 use super::visits::Chance;
 use crate::math::{Turn, sqrt};
@@ -75,9 +76,8 @@ impl Spectrum {
             if here < before || here <= after {
                 continue;
             }
-            let low = |from: usize, to: usize| (from..to).map(power).fold(f32::MAX, f32::min);
-            let left = low(sample.saturating_sub(FLANK).max(1), sample);
-            let right = low(sample + 1, sample + 1 + FLANK);
+            let left = lowest(transform, sample.saturating_sub(FLANK).max(1), sample);
+            let right = lowest(transform, sample + 1, sample + 1 + FLANK);
             let flank = left.max(right);
             // Where events come in clumps, chance grows with them.
             let sigma =
@@ -100,6 +100,14 @@ impl Spectrum {
         fundamental_first(&mut lines, hz);
         lines
     }
+}
+
+/// Lowest power of some samples.
+// Not inlined: it is called in two places.
+#[inline(never)]
+fn lowest(transform: &[Complex32], from: usize, to: usize) -> f32 {
+    let samples = transform.get(from..to.min(transform.len())).unwrap_or(&[]);
+    samples.iter().map(|value| value.re).fold(f32::MAX, f32::min)
 }
 
 /// Puts the fundamental of the highest peak first, where it is among the peaks: it winds least around its axis, and so is

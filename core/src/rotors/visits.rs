@@ -247,11 +247,17 @@ impl Visits {
     }
 
     /// Adds the time differences of some cells to the histogram; `true` once all are in it. A cell and polarity counts as much as
-    /// it has events, up to `most_weight`: 1 for all alike.
-    pub fn step(&mut self, lags: &mut [f32; LAGS], most_weight: usize, times: &[u16]) -> bool {
+    /// it has events, up to `most_weight`: 1 for all alike. The histogram ends at the window's length over 2^`finer_log2`.
+    pub fn step(
+        &mut self,
+        lags: &mut [f32; LAGS],
+        most_weight: usize,
+        finer_log2: u32,
+        times: &[u16],
+    ) -> bool {
         let mut pairs = 0;
         while self.cell < self.grid.len() && pairs < PAIRS_A_STEP {
-            pairs += 8 + self.pair(self.cell, lags, most_weight, times);
+            pairs += 8 + self.pair(self.cell, lags, most_weight, finer_log2, times);
             self.cell += 1;
         }
         self.cell >= self.grid.len()
@@ -263,11 +269,13 @@ impl Visits {
         cell: usize,
         lags: &mut [f32; LAGS],
         most_weight: usize,
+        finer_log2: u32,
         times: &[u16],
     ) -> usize {
         let most_in_cell = (most(times) / MOST_IN_CELL_SHARE).max(1);
         let times = self.of(cell, times);
         let stride = times.len().div_ceil(most_in_cell).max(1);
+        let shift = TICKS_LOG2 + 1 - LAGS.ilog2() - finer_log2;
         let kept = || times.iter().copied().step_by(stride);
         let on = kept().filter(|time| time & 1 == 1).count();
         let counts = [kept().count() - on, on];
@@ -277,8 +285,7 @@ impl Visits {
             let weight = weights[usize::from(late & 1)];
             for early in kept().take(index) {
                 if (late ^ early) & 1 == 0 {
-                    let lag =
-                        usize::from(late.saturating_sub(early)) >> (TICKS_LOG2 + 1 - LAGS.ilog2());
+                    let lag = usize::from(late.saturating_sub(early)) >> shift;
                     if let Some(sum) = lags.get_mut(lag) {
                         *sum += weight;
                     }

@@ -9,6 +9,7 @@ use crate::math::larger;
 use crate::order::sort_few;
 use crate::reading::{Evidence, Frame, Reading, Reason, RotorReading, Status};
 use crate::rotors::Disc;
+use crate::rotors::extraction::InStep;
 use crate::speed::measurement::Outcome;
 use crate::store::WINDOW_SEGMENTS;
 
@@ -32,6 +33,16 @@ const SEARCH_AGAIN: u8 = 2;
 const LEAST_EVENTS: u64 = 300;
 /// Share of events lost beyond which the rest is not trusted.
 const MOST_LOST: f32 = 0.5;
+
+/// Longest windows that are refused before the window begins short again, and that show nothing: two seconds show no blades that
+/// pass more than 256 times a second. What turns slowly shows in part of one, and then has the next ones, which move on by a third.
+const MOST_REFUSED: u8 = 3;
+const MOST_NOTHING: u8 = 1;
+/// Share of a window that grew while nothing turned, from which on it is as long as what turns there wants it.
+const MOST_OF_GROWN: f32 = 0.5;
+/// Segments that a window is measured in, at most, before it begins short again: two thirds of a second behind the longest, 140 million
+/// instructions of a device.
+const SEGMENTS_MEASURING: usize = 2;
 
 /// How long a window rotors want, in microseconds.
 #[derive(Clone, Copy, Debug, Default)]
@@ -76,12 +87,16 @@ impl Tachometer<'_> {
         } else if lost && rotors.iter().all(|rotor| rotor.speed.is_none()) {
             Status::Refused(Reason::Saturated)
         } else {
-            best_status(&rotors, self.in_step_hz)
+            best_status(&rotors, self.in_step)
         };
         // What was locked and does not lock in a window that is long for the sake of something else is told by the next short one.
         let lost_to_look = self.looks_beside() && status != Status::Locked;
         self.move_on(Some(status));
-        (!lost_to_look).then_some(Reading {
+        // Of what came into view late this window may hold little, and much of what a hand moved there before, which leads path and
+        // registrations astray together: the short one that begins now tells.
+        let came_late = self.anew_us.is_some() && self.stretch == Stretch::Tried;
+        self.satisfied &= !came_late;
+        (!lost_to_look && !came_late).then_some(Reading {
             t_us: start_us + u64::from(window_us / 2),
             window_us,
             events: account.counted,
@@ -130,18 +145,21 @@ impl Tachometer<'_> {
         }
         let mut wanted = wants.all_us;
         let refused = status.and_then(Status::reason).is_some();
-        if refused && !caught_up {
+        let too_fast = self.in_step == Some(InStep::TooFast);
+        if refused && !caught_up && !too_fast {
             wanted = larger(wanted, 1.5 * window_us);
         }
         if looks_beside {
             wanted = larger(wanted, GROWTH * window_us);
         }
         let too_long = short_again
-            || adapts && goes_on && status.is_some_and(|status| self.is_too_long(status, longest));
+            || adapts
+                && goes_on
+                && status.is_some_and(|status| self.is_too_long(status, window_us, longest));
         if too_long && goes_on {
-            // As late as measuring it may end without anything given up, so that nothing depends on when it did.
-            let last = self.store.spare() as u64;
-            let end_us = self.store.start_us() + last * u64::from(self.store.segment_us());
+            // As late as measuring it ends, so that nothing depends on when it did.
+            let segments = (WINDOW_SEGMENTS + SEGMENTS_MEASURING) as u64;
+            let end_us = self.store.start_us() + segments * u64::from(self.store.segment_us());
             self.anew_us = Some(end_us);
         } else if adapts && !too_long && wanted > ENOUGH * window_us && !longest {
             let longer = WINDOWS_US.iter().find(|w| **w as f32 >= wanted);
@@ -161,20 +179,31 @@ impl Tachometer<'_> {
         self.begin();
     }
 
-    /// Whether a window that grew before a still scene is to begin short again, because all that turns now does with less; and
-    /// keeps what speaks for that.
-    fn is_too_long(&mut self, status: Status, longest: bool) -> bool {
+    /// Whether a window that grew before a still scene is to begin short again, because all that turns now does with less, or may
+    /// do so and not be seen; and keeps what speaks for that.
+    fn is_too_long(&mut self, status: Status, window_us: f32, longest: bool) -> bool {
+        let blind = if let Stretch::Blind(times) = self.stretch { Some(times) } else { None };
+        let grown = window_us > ENOUGH * BASE_WINDOW_US as f32;
         match status {
-            Status::Locked if !longest => self.stretch = Stretch::Wanted,
-            Status::Locked if self.stretch == Stretch::Blind => {
+            Status::Locked if grown && blind.is_some() => {
                 let Wants { all_locked, all_us, .. } = self.wants();
-                if all_locked && all_us <= BASE_WINDOW_US as f32 {
+                if all_locked && all_us <= MOST_OF_GROWN * window_us {
                     self.stretch = Stretch::Tried;
                     return true;
                 }
             }
-            Status::Refused(_) if longest && self.stretch == Stretch::Wanted => {
-                self.stretch = Stretch::Blind;
+            Status::Locked if !longest => self.stretch = Stretch::Wanted,
+            Status::Refused(reason) => {
+                let nothing = reason == Reason::NoRotation;
+                if longest && (nothing || self.stretch != Stretch::Tried) {
+                    let times = blind.unwrap_or(0) + 1;
+                    let too_long = times >= if nothing { MOST_NOTHING } else { MOST_REFUSED };
+                    self.stretch = if too_long { Stretch::Wanted } else { Stretch::Blind(times) };
+                    return too_long;
+                }
+                if grown && nothing && self.stretch == Stretch::Wanted {
+                    self.stretch = Stretch::Blind(0);
+                }
             }
             _ => {}
         }
@@ -231,7 +260,7 @@ fn rotor_reading(
 }
 
 /// The best status among the rotors, or why there is none.
-fn best_status(rotors: &[RotorReading], in_step_hz: Option<f32>) -> Status {
+fn best_status(rotors: &[RotorReading], in_step: Option<InStep>) -> Status {
     let has = |status: Status| rotors.iter().any(|rotor| rotor.status == status);
     if has(Status::Locked) {
         Status::Locked
@@ -239,10 +268,12 @@ fn best_status(rotors: &[RotorReading], in_step_hz: Option<f32>) -> Status {
         Status::Coarse
     } else if let Some(first) = rotors.first() {
         first.status
-    } else if in_step_hz.is_some_and(is_mains) {
-        Status::Refused(Reason::Flicker)
     } else {
-        Status::Refused(Reason::NoRotation)
+        Status::Refused(match in_step {
+            Some(InStep::TooFast) => Reason::TooFast,
+            Some(InStep::AllOver(hz)) if is_mains(hz) => Reason::Flicker,
+            _ => Reason::NoRotation,
+        })
     }
 }
 

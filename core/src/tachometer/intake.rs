@@ -247,6 +247,10 @@ impl Tachometer<'_> {
     /// Ends the stream: what is in the window is to be measured even if the window is not full.
     pub fn finish(&mut self) {
         if self.started && self.window_segments == 0 && !self.satisfied {
+            // One that waits to begin short again was measured as it was.
+            while self.store.closed() >= WINDOW_SEGMENTS {
+                self.store.drop_oldest();
+            }
             let segments = (self.store.closed() + 1).min(WINDOW_SEGMENTS);
             self.store.hold(segments);
             self.start(segments);

@@ -19,7 +19,7 @@ impl Tachometer<'_> {
         self.window_end_us = self.last_us + 1;
         self.candidates.clear();
         self.outcomes.clear();
-        self.in_step_hz = None;
+        self.in_step = None;
         self.lost = false;
         self.searched = false;
         self.ignores_polarity = false;
@@ -121,7 +121,7 @@ impl Tachometer<'_> {
                 window.ignores_polarity = self.ignores_polarity;
                 let mut view = View { window, grid, weights, times };
                 if extraction.step(&mut view, polar, self.spectrum, scratch) {
-                    self.in_step_hz = extraction.in_step_hz();
+                    self.in_step = extraction.in_step();
                     self.round = extraction.round();
                     for candidate in extraction.candidates() {
                         let found = Found::new(candidate, self.ignores_polarity);

@@ -1,6 +1,6 @@
 //! A look at what keeps step with a line: which rotation explains it.
 
-use super::{Candidate, Extraction, For, Scratch, Stage, View};
+use super::{Candidate, Extraction, For, InStep, Scratch, Stage, View};
 use crate::limits::WINDING_PHASORS;
 use crate::math::{TAU, TurnRate, sqrt};
 use crate::rotors::belief::{LEAST_PHASORS, believe, inside};
@@ -50,7 +50,6 @@ impl Extraction {
             self.stage = Stage::Map;
             return;
         }
-        self.looked_for = For::Whole;
         self.stage = Stage::Seed;
     }
 
@@ -82,6 +81,8 @@ impl Extraction {
         match (self.looked_for, all) {
             (For::Slow, all) => self.start_track(all.unwrap_or_default()),
             // Does one rotation explain it?
+            (For::Fast, Some(all)) => self.look(For::Fast, all),
+            (For::Fast, None) => self.stage = Stage::Fast,
             (_, Some(all)) => self.look(For::Whole, all),
             (_, None) => self.stage = Stage::Line,
         }
@@ -138,7 +139,7 @@ impl Extraction {
         self.stage = match self.looked_for {
             For::Whole => Stage::Whole,
             For::Part => Stage::Part,
-            For::Slow => Stage::Slow,
+            For::Fast | For::Slow => Stage::Slow,
         };
     }
 
@@ -178,7 +179,7 @@ impl Extraction {
         let empty = region.len() < LEAST_PHASORS;
         let few = region.len() < FEW_PHASORS && scratch.explainer.cell_px().is_some();
         if self.quarter == 0 && winding.windings == 0 && winding.share > SHARE_OF_ONE && !empty {
-            self.in_step_hz = self.in_step_hz.or(Some(self.line.hz));
+            self.in_step = self.in_step.or(Some(InStep::AllOver(self.line.hz)));
             self.all_over.push(self.line.hz).ok();
         }
         self.whole = believe(&scratch.explainer, self.line.hz);

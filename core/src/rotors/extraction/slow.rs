@@ -1,21 +1,29 @@
 //! What turns too slowly to pass anywhere twice, looked for in the middle of all that moves.
 
 use super::quarters::LEAST_COMPANY;
-use super::{Extraction, For, Scratch, Stage, View};
+use super::{Extraction, For, InStep, Scratch, Stage, View};
 use crate::rotors::belief::believe;
 use crate::rotors::disc::Disc;
 use crate::rotors::heat::CellGrid;
-use crate::rotors::lines::Line;
+use crate::rotors::lines::{Line, Spectrum};
 use crate::rotors::sweep::Sweep;
 use crate::speed::polar::{PolarTrack, track};
 use crate::store::Even;
 
+/// Frequency in Hz above which blades are not followed.
+const MOST_HZ: f32 = 2_500.0;
 /// How far beside its centre a disc is swept from, in radii.
 const BESIDE: f32 = 0.5;
 
 impl Extraction {
-    /// Where nothing passes anywhere twice, what turns slowly is looked for in the middle of all that moves.
-    pub(super) fn moving(&mut self, view: &mut View<'_>, scratch: &mut Scratch) {
+    /// Where nothing passes anywhere twice, or all does so too fast to be seen, what turns slowly is looked for in the middle of
+    /// all that moves.
+    pub(super) fn moving(
+        &mut self,
+        view: &mut View<'_>,
+        spectrum: &mut Spectrum,
+        scratch: &mut Scratch,
+    ) {
         let Some(filling) = &mut self.filling else {
             if self.grid.is_empty() {
                 self.grid = view.grid;
@@ -28,7 +36,23 @@ impl Extraction {
         }
         self.filling = None;
         self.grid = scratch.visits.cells();
+        self.looked_for = For::Fast;
+        spectrum.clear();
+        self.stage = Stage::Lags;
+    }
+
+    /// Takes up the next line of blades that would be too fast.
+    pub(super) fn fast(&mut self, scratch: &mut Scratch) {
         self.stage = Stage::Heat;
+        while let Some(line) = self.lines.pop() {
+            if line.hz > MOST_HZ {
+                self.line = line;
+                self.reach = 1;
+                scratch.visits.start_map();
+                self.stage = Stage::Map;
+                return;
+            }
+        }
     }
 
     pub(super) fn heat(&mut self, view: &mut View<'_>, scratch: &Scratch) {
@@ -73,12 +97,21 @@ impl Extraction {
 
     /// One step of the look for the rotation of all that moves.
     pub(super) fn slow(&mut self, scratch: &mut Scratch) {
-        if scratch.explainer.step() {
-            if let Some(found) = believe(&scratch.explainer, self.line.hz)
-                && within(self.grid, found.disc)
-            {
-                self.enter(found);
+        if !scratch.explainer.step() {
+            return;
+        }
+        let found = believe(&scratch.explainer, self.line.hz);
+        let fast = self.looked_for == For::Fast;
+        if let Some(found) = found.filter(|found| within(self.grid, found.disc)) {
+            if fast {
+                self.in_step = Some(InStep::TooFast);
+                return self.done();
             }
+            self.enter(found);
+        }
+        if fast {
+            self.stage = Stage::Fast;
+        } else {
             self.next_slow();
         }
     }
