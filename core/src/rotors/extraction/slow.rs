@@ -1,4 +1,4 @@
-//! What turns too slowly to pass anywhere twice, looked for in the middle of all that moves.
+//! What turns too slowly to pass anywhere twice, looked for in the middle of all that moves; and before that, what turns too fast to be followed.
 
 use super::quarters::LEAST_COMPANY;
 use super::{Extraction, For, InStep, Scratch, Stage, View};
