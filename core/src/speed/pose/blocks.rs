@@ -176,7 +176,6 @@ pub struct Walk {
 /// Moves the knots to where the blocks want them: least squares with a path that walks rather than jumps, a
 /// tridiagonal system of 3 x 3 matrices, solved from end to end. Returns how far the rim moved at most, in pixels, or `None`
 /// where the blocks give no path.
-#[inline(never)]
 pub fn correct(path: &mut Path, blocks: &[Block; MAX_KNOTS], walk: Walk) -> Option<f32> {
     let blocks = &blocks[..path.blocks()];
     let walk_rad = (WALK_RAD_S + WALK_SHARE * walk.omega_rad_s.abs()) * path.step_us() * 1e-6;
@@ -184,8 +183,7 @@ pub fn correct(path: &mut Path, blocks: &[Block; MAX_KNOTS], walk: Walk) -> Opti
     let m = walk.harmonic as f32;
     let scatter = 1.0 / (2.0 * walk.coherence.max(LEAST_SHARE));
     let (px, rad) = (scatter / (walk.step_px * walk.step_px), scatter / (walk_rad * walk_rad));
-    let stiff = Vector3::new(rad, px, px);
-    let even = Matrix3::from_diagonal(&stiff);
+    let stiff = Matrix3::from_diagonal(&Vector3::new(rad, px, px));
     // A speed that is off from the start is no walk.
     let even_rad = match (knots.first(), knots.last()) {
         (Some(first), Some(last)) => (last.turn_rad - first.turn_rad) / blocks.len().max(1) as f32,
@@ -195,31 +193,26 @@ pub fn correct(path: &mut Path, blocks: &[Block; MAX_KNOTS], walk: Walk) -> Opti
         let (a, b) = (knots.get(k)?, knots.get(k + 1)?);
         Some(Vector3::new(b.turn_rad - a.turn_rad - even_rad, b.x_px - a.x_px, b.y_px - a.y_px))
     };
-    let link = |block: &Block| block.weight(m) * block.shares().1 - even;
+    let link = |block: &Block| block.weight(m) * block.shares().1 - stiff;
     let mut inverses = Vec::<Matrix3<f32>, MAX_KNOTS>::new();
     let mut sides = Vec::<Vector3<f32>, MAX_KNOTS>::new();
-    // What the block before a knot adds to it.
-    let (mut pivot_before, mut side_before) = (Matrix3::zeros(), Vector3::zeros());
     for k in 0..knots.len() {
         let mut pivot = Matrix3::identity() * 1e-3;
         let mut side = Vector3::zeros();
-        let (mut link, mut pivot_behind, mut side_behind) = (Matrix3::zeros(), pivot, side);
-        if let Some((block, step)) = blocks.get(k).zip(step(k)) {
+        if let (Some(block), Some(step)) = (blocks.get(k), step(k)) {
             let (right, later) = (Vector3::from(block.right), Vector3::from(block.later));
-            let (weight, (own, between, behind)) = (block.weight(m), block.shares());
-            let pull = stiff.component_mul(&step);
-            pivot += weight * own + even;
-            side += (right - later) * m + pull;
-            link = weight * between - even;
-            pivot_behind = weight * behind + even;
-            side_behind = later * m - pull;
+            pivot += block.weight(m) * block.shares().0 + stiff;
+            side += (right - later) * m + stiff * step;
         }
-        pivot += pivot_before;
-        side += side_before;
-        let inverse = pivot.try_inverse()?;
-        pivot_before = pivot_behind - link * inverse * link;
-        side_before = side_behind - link * (inverse * side);
-        inverses.push(inverse).ok();
+        let before = k
+            .checked_sub(1)
+            .and_then(|i| Some((blocks.get(i)?, step(i)?, inverses.get(i)?, sides.get(i)?)));
+        if let Some((block, step, inverse, before)) = before {
+            let link = link(block);
+            pivot += block.weight(m) * block.shares().2 + stiff - link * inverse * link;
+            side += Vector3::from(block.later) * m - stiff * step - link * (inverse * before);
+        }
+        inverses.push(pivot.try_inverse()?).ok();
         sides.push(side).ok();
     }
     let reach_rad = 1.0 / m;
