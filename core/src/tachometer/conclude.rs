@@ -58,7 +58,7 @@ pub(super) struct Wants {
 impl Tachometer<'_> {
     /// Turns the outcomes into a reading and moves the window on. None comes of a window in which it was only caught up with what came
     /// while another was measured, and what is followed was not to be seen: that is sparser, and the next one tells. Nor of one that is
-    /// long to look beside what is locked, and loses that.
+    /// long to look beside what is locked, and loses that, nor of one that grew before what turns in it came into view.
     pub(super) fn conclude(&mut self) -> Option<Reading> {
         if core::mem::take(&mut self.lost) {
             self.outcomes.clear();
