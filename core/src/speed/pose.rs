@@ -331,6 +331,8 @@ impl Pose {
     }
 
     /// Corrects the path by what a round saw; `true` when it was the last.
+    // Not inlined: flash is short.
+    #[inline(never)]
     fn end_round(&mut self, sums: &mut Sums) -> bool {
         let fine = self.schedule.is_fine();
         let at_low = sums.low.coherence(&sums.counts);
@@ -395,7 +397,8 @@ impl Pose {
         if !fine {
             self.first_coherence = self.coherence;
         }
-        self.phases = Some(if sharper { &sums.high } else { &sums.low }.phases(&sums.counts));
+        let learnt = if sharper { &sums.high } else { &sums.low };
+        self.phases = Some(learnt.phases(&sums.counts, self.coherence));
         let under_way = corrected && moved_rad > under_way_rad;
         if self.schedule.advance(if sharper { f32::MAX } else { moved_px }, under_way) {
             self.divide();

@@ -33,7 +33,7 @@ impl Pose {
         let cells_per_px = sides::cells_per_px(self.disc.radius_px);
         let mut seen = Vec::new();
         for event in window.segment(self.segment).iter().step_by(stride) {
-            if !event.is_of(one_of as u32) {
+            if one_of > 1 && !event.is_of(one_of as u32) {
                 continue;
             }
             let t_us = disc.since_middle_us(*event);

@@ -57,7 +57,7 @@ impl Inverted {
 
     /// What an event of this polarity counts as there.
     #[inline]
-    pub const fn is_on(self, cell: usize, is_on: bool) -> bool {
+    pub const fn is_on(&self, cell: usize, is_on: bool) -> bool {
         is_on ^ (self.0[cell / ACROSS % ACROSS] >> (cell % ACROSS) & 1 == 1)
     }
 

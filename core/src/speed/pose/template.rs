@@ -42,9 +42,10 @@ impl Template {
         in_step / total.max(1.0)
     }
 
-    /// Every bank's phase as (cosine, sine) times what its events weigh: as much as they are in step, 1 on average.
-    pub fn phases(&self, counts: &Counts) -> [(f32, f32, f32); BANKS] {
-        let mean = self.coherence(counts).max(LEAST_COHERENCE);
+    /// Every bank's phase as (cosine, sine) times what its events weigh: as much as they are in step, 1 on average, where `coherence` is
+    /// [`Self::coherence`].
+    pub fn phases(&self, counts: &Counts, coherence: f32) -> [(f32, f32, f32); BANKS] {
+        let mean = coherence.max(LEAST_COHERENCE);
         let mut phases = [(0.0, 0.0, 0.0); BANKS];
         for ((phase, (re, im)), count) in phases.iter_mut().zip(self.sums).zip(counts) {
             let count = *count as f32;
