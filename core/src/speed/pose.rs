@@ -11,6 +11,7 @@
 //! the trend gets an offset for each place in the period: what is fixed to the pixels cancels.
 
 mod blocks;
+mod divide;
 mod look;
 mod schedule;
 mod sides;
@@ -37,14 +38,6 @@ use tilt::TiltSums;
 
 /// Events that a block should hold.
 const BLOCK_EVENTS: usize = 32;
-/// Fewest blocks: a trend needs them.
-const LEAST_BLOCKS: usize = 12;
-/// Shortest block: a hand trembles up to 12 Hz, a host shakes up to some 60 Hz.
-const SHORTEST_BLOCK_US: f32 = 3_000.0;
-/// Most blocks in a symmetry period.
-const MOST_IN_PERIOD: f32 = 12.0;
-/// Most blocks that a path of all knots has: a last one may be a quarter longer.
-const MOST_PERIODS: f32 = MAX_KNOTS as f32 - 0.75;
 /// Highest angular harmonic.
 const MOST_HARMONIC: u32 = 96;
 /// A doubled harmonic must keep this share of the events in step that were so at first.
@@ -446,28 +439,6 @@ impl Pose {
         self.coherence = self.first_coherence;
         self.phases = None;
         self.schedule.again();
-    }
-
-    /// Lays the path through as many blocks as the phase and the events allow.
-    fn divide(&mut self) {
-        let events = self.events.min(self.schedule.events(self.events));
-        let even = (events as f32 * self.even_share) as usize;
-        let most = (even / BLOCK_EVENTS).min(self.schedule.blocks());
-        let most = most.clamp(LEAST_BLOCKS, MAX_KNOTS - 1) as f32;
-        // In a short window a hand does little, and a trend still needs its points.
-        let still_us = SHORTEST_BLOCK_US.min(self.window_us / (2 * LEAST_BLOCKS) as f32);
-        let shortest = (self.window_us / most).max(still_us);
-        let split = crate::math::floor((self.period_us / shortest).min(MOST_IN_PERIOD));
-        let step_us = if split >= 1.0 {
-            self.period_us / split
-        } else {
-            // Rounded down, more blocks than there are knots would be needed, and the last would be the rest of the window.
-            let least = crate::math::ceil(self.window_us / (self.period_us * MOST_PERIODS));
-            self.period_us * larger(crate::math::round(shortest / self.period_us), least)
-        };
-        self.in_period = split as usize;
-        let blocks = crate::math::ceil(self.window_us / step_us - 0.25) as usize;
-        self.path = self.path.divided(-0.5 * self.window_us, step_us, blocks);
     }
 
     /// Leaves out blocks that are not in step with the rest: the path between their neighbours brings them back.
