@@ -161,7 +161,8 @@ fn fault(words: &[&str], fault: Fault) -> Option<(Session, String)> {
     let drawn = fault_screen(fault);
     let start = Instant::now();
     while session.query_block("HCOP:SDUM:DATA?").expect("the screen") != drawn {
-        assert!(start.elapsed() < Duration::from_secs(60), "{words:?}: another screen");
+        let waits = start.elapsed() < Duration::from_secs(60);
+        assert!(waits, "{words:?}: another screen, and {:?}", session.query("SYST:FAULT?"));
     }
     Some((session, said))
 }
