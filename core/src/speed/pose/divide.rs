@@ -24,9 +24,11 @@ impl Pose {
         let still_us = SHORTEST_BLOCK_US.min(self.window_us / (2 * LEAST_BLOCKS) as f32);
         let shortest = (self.window_us / most).max(still_us);
         let split = floor(self.period_us / shortest);
-        // Where few events ask for few blocks, whole periods of a slow rotor must not make them fewer still.
+        // Where few events ask for few blocks, whole periods of a slow rotor must not make them fewer still: in a hand, of six no trend
+        // is told.
         let per_block = self.period_us / self.window_us * LEAST_BLOCKS as f32;
-        let least = if per_block > 1.0 { ceil(per_block - 0.25) } else { 0.0 };
+        let short = self.schedule.follows_hand() && per_block > 1.0;
+        let least = if short { ceil(per_block - 0.25) } else { 0.0 };
         let split = larger(split, least).min(MOST_IN_PERIOD);
         let step_us = if split >= 1.0 {
             self.period_us / split
@@ -50,7 +52,7 @@ mod tests {
     /// Blocks of a window of 200 ms with so many symmetry periods and so many of the rotor's events.
     fn blocks(periods: f32, events: usize) -> usize {
         let disc = Disc { x_px: 100.0, y_px: 100.0, radius_px: 50.0 };
-        let mut pose = Pose::new(disc, TAU * periods / 0.2, 1, 1, 200_000);
+        let mut pose = Pose::new(disc, TAU * periods / 0.2, 1, 1, 200_000).known(true);
         pose.events = events;
         pose.divide();
         assert!(pose.path.blocks() < MAX_KNOTS);
@@ -58,7 +60,7 @@ mod tests {
     }
 
     #[test]
-    fn few_events_of_a_slow_rotor_leave_blocks_enough_for_a_trend() {
+    fn few_events_of_a_slow_rotor_in_a_hand_leave_blocks_enough_for_a_trend() {
         for hundredths in 100..1_200_u16 {
             let periods = f32::from(hundredths) / 100.0;
             let blocks = blocks(periods, 300);

@@ -32,6 +32,8 @@ pub struct Schedule {
     most_events: usize,
     /// Whether to ask where polarities are the other way round.
     sides: bool,
+    /// Whether a rotor is followed that a hand moved.
+    follows_hand: bool,
 }
 
 /// Most events of a rotor that was followed that are looked at: a PC keeps up with twenty readings a second of it.
@@ -52,6 +54,7 @@ impl Schedule {
         share: 1,
         most_events: usize::MAX,
         sides: true,
+        follows_hand: false,
     };
     /// For a rotor that was followed in the window before: a third of the events tell it as well. A path that starts where it was is
     /// not led astray by its sides.
@@ -64,7 +67,8 @@ impl Schedule {
         ..Self::NEW
     };
     /// The same for one that a hand moved meanwhile, which is known by its parts alone.
-    pub const MOVED: Self = Self { most: [1, 1, 4, 1], sides: true, ..Self::KNOWN };
+    pub const MOVED: Self =
+        Self { most: [1, 1, 4, 1], sides: true, follows_hand: true, ..Self::KNOWN };
 
     /// The phase that the next round belongs to.
     pub const fn phase(&self) -> Phase {
@@ -134,9 +138,15 @@ impl Schedule {
         true
     }
 
-    /// Where the phase before has `corrected` a path of as many blocks, and the fine rounds begin, their first is done.
+    /// Whether a rotor is followed that a hand moved meanwhile.
+    pub const fn follows_hand(&self) -> bool {
+        self.follows_hand
+    }
+
+    /// Where a hand is followed, the phase before has `corrected` a path of as many blocks, and the fine rounds begin, their first is
+    /// done.
     pub fn skip_first_fine(&mut self, corrected: bool) {
-        if self.phase == Phase::Fine {
+        if self.follows_hand && self.phase == Phase::Fine {
             self.round += u8::from(corrected);
         }
     }
