@@ -394,9 +394,7 @@ impl Pose {
         self.phases = Some(learnt.phases(&sums.counts, self.coherence));
         let under_way = corrected && moved_rad > under_way_rad;
         if self.schedule.advance(if sharper { f32::MAX } else { moved_px }, under_way) {
-            let before = self.path.blocks();
             self.divide();
-            self.schedule.skip_first_fine(corrected && self.path.blocks() == before);
             let moves = self.drift_px_s() > MOVING_PX_S;
             if moves && self.schedule.reaches_out() && self.harmonic > self.first_harmonic {
                 // A sample leaves the path off by more than the harmonic's reach where a hand moves fast: half of it reaches

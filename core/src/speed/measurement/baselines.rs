@@ -22,7 +22,7 @@ const MORE: f32 = 1.5;
 const FRACTIONAL: Effort = Effort { pairs: 3, ..LOCK };
 /// The same where these few deviate: scatter goes, an alias stays.
 const FRACTIONAL_AGAIN: Effort = Effort { pairs: 9, ..LOCK };
-/// The lock of a rotor that is followed: the phase tells its speed, and these bear it out.
+/// The lock of a rotor that is followed: the phase tells its speed, and these bear it out, for which they need not settle as far.
 const FOLLOWING: Effort = Effort { pairs: 3, points: SLICE_POINTS / 2, settled: 0.3 };
 /// Where there are more events than this for each pair, more pairs are registered, up to [`crate::limits::MAX_PAIRS`].
 const PAIR_EVENTS: usize = 1_536;

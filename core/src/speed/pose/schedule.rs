@@ -143,14 +143,6 @@ impl Schedule {
         self.follows_hand
     }
 
-    /// Where a hand is followed, the phase before has `corrected` a path of as many blocks, and the fine rounds begin, their first is
-    /// done.
-    pub fn skip_first_fine(&mut self, corrected: bool) {
-        if self.follows_hand && self.phase == Phase::Fine {
-            self.round += u8::from(corrected);
-        }
-    }
-
     /// Events that this round looks at, at most, of so many.
     pub fn events(&self, all: usize) -> usize {
         if self.samples() {
