@@ -67,6 +67,12 @@ pub fn larger(a: f32, b: f32) -> f32 {
     if a < b { b } else { a }
 }
 
+/// The smaller of two numbers, as the same.
+#[must_use]
+pub fn smaller(a: f32, b: f32) -> f32 {
+    if b < a { b } else { a }
+}
+
 /// Tangent of an eighth of a half turn.
 const TAN_EIGHTH: f32 = 0.414_213_56;
 

@@ -42,29 +42,70 @@ pub struct Cut {
 
 impl Cut {
     /// Collects the slice, evenly thinned to the most.
-    pub fn collect(&self, window: &Window<'_>, disc: &Moving<'_>, slice: &mut Slice) {
-        slice.clear();
-        let mut total = 0;
-        // Counted first, in the same loop: flash is short.
-        for counts in [true, false] {
-            let (mut index, mut next) = (0, 0);
-            for fold in 0..self.folds {
-                let start_us = self.start_us + fold as f32 * self.period_us;
-                let end_us = start_us + self.length_us;
-                for event in window.between(start_us as i32, end_us as i32) {
-                    let Some((x_px, y_px, _)) = disc.place(event) else { continue };
-                    if counts {
-                        total += 1;
-                        continue;
-                    }
-                    if index * self.most >= next {
-                        let tau_s = (event.since(window.start_us) as f32 - start_us) * 1e-6;
-                        slice.push(SlicePoint { x_px, y_px, tau_s, on: window.is_on(event) }).ok();
-                        next += total.max(self.most);
-                    }
-                    index += 1;
-                }
-            }
+    pub fn collect(&self, window: &Window<'_>, disc: Moving<'_>, slice: &mut Slice) {
+        // All that there is room for; it rarely is not enough for all of them.
+        let total = self.take(self.most, window, disc, slice);
+        if total > SLICE_POINTS {
+            self.take(total, window, disc, slice);
+        } else if total > self.most {
+            let mut keep = Thinning::new(self.most, total);
+            slice.retain(|_| keep.next());
         }
+    }
+
+    /// Takes the most of so many events; the number of all that there are.
+    // Not inlined: it is called twice.
+    #[inline(never)]
+    fn take(
+        &self,
+        of: usize,
+        window: &Window<'_>,
+        mut disc: Moving<'_>,
+        slice: &mut Slice,
+    ) -> usize {
+        slice.clear();
+        let mut keep = Thinning::new(self.most, of);
+        for fold in 0..self.folds {
+            let start_us = self.start_us + fold as f32 * self.period_us;
+            let end_us = start_us + self.length_us;
+            // Events are gone through in stretches, which a loop over all of them would not know.
+            window.between(start_us as i32, end_us as i32).for_each(|event| {
+                if let Some((x_px, y_px, _)) = disc.place(event)
+                    && keep.next()
+                {
+                    let tau_s = (event.since(window.start_us) as f32 - start_us) * 1e-6;
+                    slice.push(SlicePoint { x_px, y_px, tau_s, on: window.is_on(event) }).ok();
+                }
+            });
+        }
+        keep.count
+    }
+}
+
+/// Keeps the most of so many, evenly.
+#[derive(Clone, Copy, Debug)]
+pub struct Thinning {
+    most: usize,
+    of: usize,
+    /// How many there were, and which is kept next, by `most` times its number.
+    count: usize,
+    next: usize,
+}
+
+impl Thinning {
+    /// Keeps `most` of `of`.
+    #[must_use]
+    pub const fn new(most: usize, of: usize) -> Self {
+        Self { most, of, count: 0, next: 0 }
+    }
+
+    /// Whether the next one is kept.
+    pub const fn next(&mut self) -> bool {
+        let keeps = self.count * self.most >= self.next;
+        if keeps {
+            self.next += self.of;
+        }
+        self.count += 1;
+        keeps
     }
 }

@@ -73,6 +73,8 @@ pub struct Found {
     pub line_hz: f32,
     /// Whether it was found, and is measured, without regard to polarity.
     pub ignores_polarity: bool,
+    /// Whether polarities were the other way round in parts of it, once it was measured.
+    pub sided: bool,
     /// How it is tilted, once that was asked.
     pub tilt: Option<Tilt>,
     /// Root mean square speed of its axis in px/s, once it was followed: 0 on a tripod, tens in the hand.

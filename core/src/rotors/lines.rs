@@ -4,7 +4,7 @@ use heapless::Vec;
 use microfft::Complex32;
 
 use super::visits::Chance;
-use crate::math::{Turn, sqrt};
+use crate::math::{Turn, smaller, sqrt};
 use crate::order::sort_few;
 
 /// Bins of the autocorrelation over the window's length: 150 ms / 1 024 = 146 us, so 3.4 kHz is the highest frequency.
@@ -107,7 +107,7 @@ impl Spectrum {
 #[inline(never)]
 fn lowest(transform: &[Complex32], from: usize, to: usize) -> f32 {
     let samples = transform.get(from..to.min(transform.len())).unwrap_or(&[]);
-    samples.iter().map(|value| value.re).fold(f32::MAX, f32::min)
+    samples.iter().map(|value| value.re).fold(f32::MAX, smaller)
 }
 
 /// Puts the fundamental of the highest peak first, where it is among the peaks: it winds least around its axis, and so is

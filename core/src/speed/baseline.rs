@@ -210,9 +210,9 @@ impl Pairs {
             folds: self.folds,
             most: self.effort.points,
         };
-        cut.collect(window, &disc, &mut icp.first);
+        cut.collect(window, disc, &mut icp.first);
         cut.start_us += baseline_us;
-        cut.collect(window, &disc, &mut icp.second);
+        cut.collect(window, disc, &mut icp.second);
     }
 
     /// Starts the registrations from another speed, at the same baseline.

@@ -13,7 +13,7 @@ use heapless::Vec;
 
 use super::path::{Moving, Path};
 use crate::order::sort_few;
-use crate::registration::{Icp, Progress, Registered, Residual, Slice, SlicePoint};
+use crate::registration::{Icp, Progress, Registered, Residual, Slice, SlicePoint, Thinning};
 use crate::rotors::Disc;
 use crate::store::{WINDOW_SEGMENTS, Window};
 
@@ -82,19 +82,40 @@ impl Ladder {
         self.rate
     }
 
-    /// The rotor's events of the segment, placed.
-    fn placed<'a>(
+    /// Moves a range of the rotor's events of the segment, placed and thinned to about `most`, into a slice.
+    // Not inlined: it is called in three places.
+    #[inline(never)]
+    fn take(
         &self,
-        window: &Window<'a>,
-        path: &'a Path,
-    ) -> impl Iterator<Item = (i32, SlicePoint)> + use<'a> {
-        let disc = Moving::new(self.disc, path, window);
-        let start_us = window.start_us;
-        window.segment(self.segment).iter().filter_map(move |event| {
-            let (x_px, y_px, _) = disc.place(*event)?;
-            let point = SlicePoint { x_px, y_px, tau_s: 0.0, on: event.is_on() };
-            Some((event.since(start_us), point))
-        })
+        window: &Window<'_>,
+        path: &Path,
+        range: Range<usize>,
+        most: usize,
+        slice: &mut Slice,
+    ) -> Taken {
+        slice.clear();
+        let mut disc = Moving::new(self.disc, path, window);
+        let mut keep = Thinning::new(most, range.len());
+        let (mut count, mut sum_us, mut from_us, mut to_us) = (0, 0.0_f32, None, 0);
+        for event in window.segment(self.segment) {
+            let Some((x_px, y_px, _)) = disc.place(*event) else { continue };
+            if count == range.end {
+                break;
+            }
+            count += 1;
+            if count > range.start && keep.next() {
+                let t_us = event.since(window.start_us);
+                slice.push(SlicePoint { x_px, y_px, tau_s: 0.0, on: event.is_on() }).ok();
+                sum_us += t_us as f32;
+                from_us = from_us.or(Some(t_us));
+                to_us = t_us;
+            }
+        }
+        Taken {
+            count,
+            mean_us: sum_us / slice.len().max(1) as f32,
+            span_us: (to_us - from_us.unwrap_or(to_us)) as f32,
+        }
     }
 
     /// Cuts the slices of the next level, or advances their registration by one iteration; `true` at the top.
@@ -107,12 +128,13 @@ impl Ladder {
             };
         }
         if self.level == 0 {
-            self.size = (self.placed(window, path).count() / SLICES).min(MOST_EVENTS);
+            let all = self.take(window, path, 0..usize::MAX, 0, &mut icp.first);
+            self.size = (all.count / SLICES).min(MOST_EVENTS);
             if self.size < LEAST_EVENTS {
                 return true;
             }
-            let events = self.placed(window, path);
-            (self.first_us, _) = take(events, 0..self.size, self.size, &mut icp.first);
+            let first = self.take(window, path, 0..self.size, self.size, &mut icp.first);
+            self.first_us = first.mean_us;
             self.passed = self.size;
         }
         self.level += 1;
@@ -124,14 +146,13 @@ impl Ladder {
         let length = self.size.max((GROWTH * self.passed as f32) as usize);
         let range = self.passed..self.passed + length;
         self.passed += length;
-        let events = self.placed(window, path);
-        let (second_us, length_us) = take(events, range, self.size, &mut icp.second);
-        let baseline_s = (second_us - self.first_us) * 1e-6;
+        let second = self.take(window, path, range, self.size, &mut icp.second);
+        let baseline_s = (second.mean_us - self.first_us) * 1e-6;
         let rate_so_far = if self.seen { self.rate.unwrap_or(0.0).abs() } else { 0.0 };
         if icp.second.len() < self.size / 2
             || baseline_s <= 0.0
             || rate_so_far * baseline_s > MOST_TURN_RAD
-            || rate_so_far * length_us * 1e-6 > MOST_BLUR_RAD
+            || rate_so_far * second.span_us * 1e-6 > MOST_BLUR_RAD
         {
             return false;
         }
@@ -157,29 +178,13 @@ impl Ladder {
     }
 }
 
-/// Moves a range of the events, thinned to about `most`, into a slice; their mean time and their span in us.
-// Not inlined: it is called twice.
-#[inline(never)]
-fn take(
-    events: impl Iterator<Item = (i32, SlicePoint)>,
-    range: Range<usize>,
-    most: usize,
-    slice: &mut Slice,
-) -> (f32, f32) {
-    slice.clear();
-    let (mut sum_us, mut from_us, mut to_us) = (0.0_f32, None, 0);
-    let mut next = 0;
-    let length = range.len();
-    for (index, (t_us, point)) in events.skip(range.start).take(length).enumerate() {
-        if index * most >= next {
-            next += length;
-            slice.push(point).ok();
-            sum_us += t_us as f32;
-            from_us = from_us.or(Some(t_us));
-            to_us = t_us;
-        }
-    }
-    (sum_us / slice.len().max(1) as f32, (to_us - from_us.unwrap_or(to_us)) as f32)
+/// What is in a slice.
+struct Taken {
+    /// Events of the segment up to its end.
+    count: usize,
+    /// Their mean time in it, and what it spans, in microseconds.
+    mean_us: f32,
+    span_us: f32,
 }
 
 /// The median of values, which it sorts.

@@ -100,6 +100,8 @@ pub struct Measurement {
     faint: bool,
     /// Angular harmonic whose phase is followed.
     harmonic: u32,
+    /// Whether polarities were the other way round in parts of it, in any window.
+    sided: bool,
     tilt: Option<Tilt>,
     pose: Pose,
     /// Frequency and angular harmonic of the line that the rotor was found by.
@@ -140,6 +142,7 @@ impl Measurement {
             faint: false,
             harmonic: found.windings,
             pose: Pose::new(found.disc, found.omega_rad_s, 1, found.windings, 0),
+            sided: found.sided,
             tilt: found.tilt,
             line_hz: found.line_hz,
             windings: found.windings,
@@ -265,13 +268,14 @@ impl Measurement {
             let tells = self.parts.is_some_and(|parts| parts >= TILTED_PARTS) && !self.doubted();
             let known = self.follows && (self.tilt.is_some() || !tells);
             let pose = if tells { pose.tilted(self.tilt.unwrap_or_default()) } else { pose };
-            self.pose = if known { pose.known(self.moves()) } else { pose };
+            self.pose = if known { pose.known(self.moves(), self.sided) } else { pose };
         }
         if !self.pose.step(window, sums, even) {
             return;
         }
         self.turn = 0;
         self.disc = self.pose.disc();
+        self.sided |= self.pose.sided();
         self.events = self.pose.events();
         self.evidence.events = self.events as u32;
         if self.events < LEAST_EVENTS {
@@ -332,6 +336,7 @@ impl Measurement {
                     self.harmonic.max(self.pose.harmonic() / 4)
                 },
                 line_hz: self.line_hz,
+                sided: self.sided,
                 tilt: self.pose.tilt(),
                 drift_px_s: self.drift_px_s,
                 ..Found::default()

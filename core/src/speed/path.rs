@@ -81,7 +81,7 @@ impl Path {
 
     /// The block that an instant lies in, and how far through it: 0 to 1, beyond it outside the path.
     #[must_use]
-    pub fn place(&self, t_us: f32) -> (usize, f32) {
+    fn place(&self, t_us: f32) -> (usize, f32) {
         let place = (t_us - self.start_us) * self.per_us;
         // Casting a negative float gives 0.
         let index = (place as usize).min(self.blocks().saturating_sub(1));
@@ -99,19 +99,43 @@ impl Path {
     // Not inlined: flash is short.
     #[inline(never)]
     pub fn at(&self, t_us: f32) -> Knot {
-        self.between(self.place(t_us))
+        let (index, f) = self.place(t_us);
+        self.stretch(index).at(f)
     }
 
-    /// Where the rotor was so far through a block.
-    #[must_use]
-    pub fn between(&self, (index, f): (usize, f32)) -> Knot {
+    /// The way through a block.
+    // Not inlined: it is called in several places, and seldom.
+    #[inline(never)]
+    fn stretch(&self, index: usize) -> Stretch {
         let (Some(a), Some(b)) = (self.knots.get(index), self.knots.get(index + 1)) else {
-            return Knot::default();
+            return Stretch { index, ..Stretch::default() };
         };
+        let way = Knot {
+            x_px: b.x_px - a.x_px,
+            y_px: b.y_px - a.y_px,
+            turn_rad: b.turn_rad - a.turn_rad,
+        };
+        Stretch { index, start: *a, way }
+    }
+}
+
+/// The straight way through a block.
+#[derive(Clone, Copy, Debug, Default)]
+struct Stretch {
+    index: usize,
+    start: Knot,
+    /// From there to the block's end.
+    way: Knot,
+}
+
+impl Stretch {
+    /// Where the rotor was so far through the block.
+    fn at(&self, f: f32) -> Knot {
+        let Self { start, way, .. } = self;
         Knot {
-            x_px: a.x_px + f * (b.x_px - a.x_px),
-            y_px: a.y_px + f * (b.y_px - a.y_px),
-            turn_rad: a.turn_rad + f * (b.turn_rad - a.turn_rad),
+            x_px: start.x_px + f * way.x_px,
+            y_px: start.y_px + f * way.y_px,
+            turn_rad: start.turn_rad + f * way.turn_rad,
         }
     }
 }
@@ -121,6 +145,8 @@ impl Path {
 pub struct Moving<'p> {
     annulus: Annulus,
     path: &'p Path,
+    /// The block of the event before: events of a block follow each other.
+    stretch: Stretch,
     start_us: u64,
     middle_us: i32,
 }
@@ -130,14 +156,25 @@ impl<'p> Moving<'p> {
     #[must_use]
     pub fn new(disc: Disc, path: &'p Path, window: &Window<'_>) -> Self {
         let middle_us = (window.duration_us / 2) as i32;
-        Self { annulus: Annulus::of(disc), path, start_us: window.start_us, middle_us }
+        let (annulus, stretch) = (Annulus::of(disc), path.stretch(0));
+        Self { annulus, path, stretch, start_us: window.start_us, middle_us }
     }
 
     /// Position relative to the axis, and its squared length, when the event lies in the disc's annulus.
-    #[must_use]
-    pub fn place(&self, event: StoredEvent) -> Option<(f32, f32, f32)> {
-        let knot = self.path.between(self.path.place(self.since_middle_us(event) as f32));
+    #[inline]
+    pub fn place(&mut self, event: StoredEvent) -> Option<(f32, f32, f32)> {
+        let (.., knot) = self.follow(self.since_middle_us(event));
         self.place_by(event, knot)
+    }
+
+    /// The block that an instant lies in, how far through it, and where the rotor was then: `t_us` after the middle of the window.
+    #[inline]
+    pub fn follow(&mut self, t_us: i32) -> (usize, f32, Knot) {
+        let (index, f) = self.path.place(t_us as f32);
+        if index != self.stretch.index {
+            self.stretch = self.path.stretch(index);
+        }
+        (index, f, self.stretch.at(f))
     }
 
     /// The same, where the path is known for the instant of the event.

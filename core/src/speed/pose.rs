@@ -182,12 +182,18 @@ impl Pose {
         }
     }
 
-    /// The same for a rotor whose place and speed are known from the window before, in which it `moved` or not: fewer rounds
-    /// will do.
+    /// The same for a rotor whose place and speed are known from the window before, in which it `moved` or not, and polarities were
+    /// the other way round in parts of it or nowhere: fewer rounds will do.
     #[must_use]
-    pub const fn known(mut self, moved: bool) -> Self {
-        self.schedule = if moved { Schedule::MOVED } else { Schedule::KNOWN };
+    pub const fn known(mut self, moved: bool, sided: bool) -> Self {
+        self.schedule = if moved { Schedule::moved(sided) } else { Schedule::KNOWN };
         self
+    }
+
+    /// Whether polarities are the other way round in parts of the rotor.
+    #[must_use]
+    pub fn sided(&self) -> bool {
+        self.inverted.any()
     }
 
     /// The same for a rotor of so many parts that differ: each has its own template, on fewer rings.

@@ -24,6 +24,8 @@ const FRACTIONAL: Effort = Effort { pairs: 3, ..LOCK };
 const FRACTIONAL_AGAIN: Effort = Effort { pairs: 9, ..LOCK };
 /// The lock of a rotor that is followed: the phase tells its speed, and these bear it out, for which they need not settle as far.
 const FOLLOWING: Effort = Effort { pairs: 3, points: SLICE_POINTS / 2, settled: 0.3 };
+/// An alias is off by ten times what a pair of few points scatters by.
+const FRACTIONAL_FOLLOWING: Effort = Effort { pairs: 1, points: SLICE_POINTS / 4, ..FOLLOWING };
 /// Where there are more events than this for each pair, more pairs are registered, up to [`crate::limits::MAX_PAIRS`].
 const PAIR_EVENTS: usize = 1_536;
 /// The same of the refinement, whose pairs are short and gain by overlapping.
@@ -188,7 +190,7 @@ impl Measurement {
                 return;
             }
         }
-        let effort = if self.follows { Effort { pairs: 1, ..FOLLOWING } } else { FRACTIONAL };
+        let effort = if self.follows { FRACTIONAL_FOLLOWING } else { FRACTIONAL };
         self.turn = 0;
         self.plan_lock_pairs(window, (longest - FRACTION).max(LEAST_FRACTIONAL), effort);
         self.stage = Stage::Fractional;

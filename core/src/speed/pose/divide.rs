@@ -52,7 +52,7 @@ mod tests {
     /// Blocks of a window of 200 ms with so many symmetry periods and so many of the rotor's events.
     fn blocks(periods: f32, events: usize) -> usize {
         let disc = Disc { x_px: 100.0, y_px: 100.0, radius_px: 50.0 };
-        let mut pose = Pose::new(disc, TAU * periods / 0.2, 1, 1, 200_000).known(true);
+        let mut pose = Pose::new(disc, TAU * periods / 0.2, 1, 1, 200_000).known(true, false);
         pose.events = events;
         pose.divide();
         assert!(pose.path.blocks() < MAX_KNOTS);

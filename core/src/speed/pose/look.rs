@@ -19,7 +19,7 @@ impl Pose {
         // events, so that what is fixed to them cancels from period to period.
         let by_event = self.schedule.samples() || self.even_share < 1.0;
         let (stride, one_of) = if by_event { (one_of, 1) } else { (1, one_of) };
-        let disc = Moving::new(self.disc, &self.path, window);
+        let mut disc = Moving::new(self.disc, &self.path, window);
         let rate = TurnRate::from_rad_s(self.omega_rad_s);
         let rings = (RINGS / self.sectors as usize).max(1);
         let rings_per_px = rings as f32 / self.disc.radius_px.max(1.0);
@@ -37,8 +37,7 @@ impl Pose {
                 continue;
             }
             let t_us = disc.since_middle_us(*event);
-            let (index, f) = self.path.place(t_us as f32);
-            let knot = self.path.between((index, f));
+            let (index, f, knot) = disc.follow(t_us);
             let Some(place) = disc.place_by(*event, knot) else { continue };
             let (x_px, y_px, r2) = self.tilt.map_or(place, |tilt| tilt.undone(place));
             let turn = Turn::from_rad(knot.turn_rad).plus(rate.after(t_us));

@@ -66,9 +66,11 @@ impl Schedule {
         sides: false,
         ..Self::NEW
     };
-    /// The same for one that a hand moved meanwhile, which is known by its parts alone.
-    pub const MOVED: Self =
-        Self { most: [1, 1, 4, 1], sides: true, follows_hand: true, ..Self::KNOWN };
+
+    /// The same for one that a hand moved meanwhile, which is known by its parts alone; and by its sides, where it has any.
+    pub const fn moved(sides: bool) -> Self {
+        Self { most: [1, 1, 4, 1], sides, follows_hand: true, ..Self::KNOWN }
+    }
 
     /// The phase that the next round belongs to.
     pub const fn phase(&self) -> Phase {
