@@ -54,6 +54,12 @@ impl Metric {
     }
 }
 
+/// Whether points that are so far away at least may be nearer than the best.
+fn may_be_nearer(apart_px: f32, best: (usize, f32)) -> bool {
+    let least_px = larger(apart_px - ROUNDING_PX, 0.0);
+    least_px * least_px <= best.1
+}
+
 impl Grid {
     /// Sorts the points into cells; `reach_px` is the largest distance of a point from the centre.
     pub fn build(&mut self, points: &[SlicePoint], reach_px: f32, metric: Metric) {
@@ -99,6 +105,7 @@ impl Grid {
     #[must_use]
     pub fn nearest(&self, query: SlicePoint) -> Option<(usize, f32)> {
         let (column, row) = (self.cell(query.x_px), self.cell(query.y_px));
+        let left_px = query.x_px + self.half_px - column as f32 * self.cell_px;
         let above_px = query.y_px + self.half_px - row as f32 * self.cell_px;
         let bank = if query.on { SIDE } else { 0 };
         let query = self.metric.place(&query);
@@ -107,10 +114,6 @@ impl Grid {
         // The cell and those around it, as far as they may hold something nearer; then ring after ring.
         let (left, right) = (column.saturating_sub(1), (column + 1).min(SIDE - 1));
         self.visit(query, bank + row, (left, right), &mut best);
-        let may_be_nearer = |apart_px: f32, best: (usize, f32)| {
-            let least_px = larger(apart_px - ROUNDING_PX, 0.0);
-            least_px * least_px <= best.1
-        };
         if row > 0 && may_be_nearer(above_px, best) {
             self.visit(query, bank + row - 1, (left, right), &mut best);
         }
@@ -124,34 +127,44 @@ impl Grid {
             if closest * closest > best.1 {
                 break;
             }
-            self.visit_ring(query, (column, row, bank), ring, &mut best);
+            let beyond = (closest + left_px, closest + above_px);
+            self.visit_ring(query, (column, row, bank), ring, beyond, &mut best);
         }
         let index = self.order.get(best.0)?;
         Some((usize::from(*index), best.1))
     }
 
-    /// Looks at the cells so many cells away.
+    /// Looks at the cells so many cells away, where those to the left, and above, are so far away.
     fn visit_ring(
         &self,
         query: [f32; 3],
         (column, row, bank): (usize, usize, usize),
         ring: usize,
+        (left_px, above_px): (f32, f32),
         best: &mut (usize, f32),
     ) {
-        let (left, right) = (column.wrapping_sub(ring), column + ring);
-        let (first, last) = (row.wrapping_sub(ring), row + ring);
-        for y in row.saturating_sub(ring)..(last + 1).min(SIDE) {
-            if y == first || y == last {
-                let left = if left < SIDE { left } else { 0 };
-                self.visit(query, bank + y, (left, right.min(SIDE - 1)), best);
-            } else {
-                if left < SIDE {
-                    self.visit(query, bank + y, (left, left), best);
-                }
-                if right < SIDE {
-                    self.visit(query, bank + y, (right, right), best);
-                }
-            }
+        // To the right, and below, they are as much nearer or farther as the query lies off its cell's middle.
+        let across_px = (2 * ring - 1) as f32 * self.cell_px;
+        let (right_px, below_px) = (across_px - left_px, across_px - above_px);
+        let (left, right) = (column.checked_sub(ring), column + ring);
+        let columns = (left.unwrap_or(0), right.min(SIDE - 1));
+        let (above, below) = (row.checked_sub(ring), row + ring);
+        if let Some(above) = above
+            && may_be_nearer(above_px, *best)
+        {
+            self.visit(query, bank + above, columns, best);
+        }
+        let rows = above.map_or(0, |above| above + 1)..below.min(SIDE);
+        if let Some(left) = left
+            && may_be_nearer(left_px, *best)
+        {
+            rows.clone().for_each(|row| self.visit(query, bank + row, (left, left), best));
+        }
+        if right < SIDE && may_be_nearer(right_px, *best) {
+            rows.for_each(|row| self.visit(query, bank + row, (right, right), best));
+        }
+        if below < SIDE && may_be_nearer(below_px, *best) {
+            self.visit(query, bank + below, columns, best);
         }
     }
 
