@@ -39,6 +39,13 @@ impl Phasor {
         let (dx, dy) = (self.x_px - disc.x_px, self.y_px - disc.y_px);
         dx * dx + dy * dy
     }
+
+    /// The same, as long as its amplitude: chance does not count.
+    #[must_use]
+    pub fn without_chance(self) -> Self {
+        let norm = self.amplitude / sqrt(self.re * self.re + self.im * self.im);
+        Self { re: self.re * norm, im: self.im * norm, ..self }
+    }
 }
 
 /// A square of cells of any size, so that they are as fine as the map's memory allows.

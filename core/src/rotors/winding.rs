@@ -60,7 +60,8 @@ pub struct Winding {
     pub over_chance: f32,
 }
 
-/// Collects the phasors for which `inside` holds, evenly thinned to the capacity; returns their number before that too.
+/// Collects the phasors for which `inside` holds, without what chance adds, evenly thinned to the capacity; returns their number before
+/// that too.
 fn collect(
     phasors: impl Iterator<Item = Phasor> + Clone,
     inside: impl Fn(&Phasor) -> bool,
@@ -70,7 +71,7 @@ fn collect(
     let mut next = 0;
     for (index, phasor) in phasors.filter(&inside).enumerate() {
         if index * WINDING_PHASORS >= next {
-            region.push(phasor).ok();
+            region.push(phasor.without_chance()).ok();
             next += total.max(WINDING_PHASORS);
         }
     }
@@ -124,7 +125,7 @@ impl Explainer {
 
     /// Adds an event, while there is room.
     pub fn add(&mut self, event: Phasor) {
-        self.region.push(event).ok();
+        self.region.push(event.without_chance()).ok();
     }
 
     /// All events were added, out of so many before thinning.
@@ -234,7 +235,6 @@ struct Around {
     direction: (f32, f32),
     /// Ring and polarity.
     bank: usize,
-    /// Its amplitude at its phase, so that chance does not count.
     re: f32,
     im: f32,
 }
@@ -251,14 +251,13 @@ impl Around {
         if r_px < 1.0 {
             return None;
         }
-        let ring = ((r_px / radius_px.max(1.0) * rings as f32) as usize).min(rings - 1);
-        let norm = phasor.amplitude / sqrt(phasor.re * phasor.re + phasor.im * phasor.im);
+        let ring = ((r_px / larger(radius_px, 1.0) * rings as f32) as usize).min(rings - 1);
         Some(Self {
             r_px,
             direction: (dx / r_px, dy / r_px),
             bank: 2 * ring + usize::from(phasor.on),
-            re: phasor.re * norm,
-            im: phasor.im * norm,
+            re: phasor.re,
+            im: phasor.im,
         })
     }
 
@@ -299,7 +298,7 @@ fn about(region: &[Phasor], x_px: f32, y_px: f32, radius_px: f32, most: usize) -
         }
     }
     // Without each phasor's square, so that a bank of one phasor explains nothing.
-    let possible: f32 = weights.iter().map(|(sum, sum2)| sqrt((sum * sum - sum2).max(0.0))).sum();
+    let possible: f32 = weights.iter().map(|(sum, sum2)| sqrt(larger(sum * sum - sum2, 0.0))).sum();
     let mut found = Winding { x_px, y_px, ..Winding::default() };
     let mut best = MOST_WINDINGS;
     for term in MOST_WINDINGS - most..=MOST_WINDINGS + most {
@@ -308,7 +307,7 @@ fn about(region: &[Phasor], x_px: f32, y_px: f32, radius_px: f32, most: usize) -
             .zip(&weights)
             .map(|(bank, (_, squares))| {
                 let (re, im) = bank[term];
-                sqrt((re * re + im * im - squares).max(0.0))
+                sqrt(larger(re * re + im * im - squares, 0.0))
             })
             .sum();
         let share = aligned / possible.max(1.0);

@@ -1,6 +1,6 @@
 //! The rotor in its own frame: the phase of one angular harmonic on many narrow rings, for each polarity.
 
-use crate::math::sqrt;
+use crate::math::{larger, sqrt};
 
 /// Rings between centre and rim.
 pub const RINGS: usize = 32;
@@ -36,22 +36,22 @@ impl Template {
         let (mut in_step, mut total) = (0.0, 0.0);
         for (sum, count) in self.sums.iter().zip(counts) {
             let excess = sum.0 * sum.0 + sum.1 * sum.1 - *count as f32;
-            in_step += sqrt(excess.max(0.0));
+            in_step += sqrt(larger(excess, 0.0));
             total += *count as f32;
         }
-        in_step / total.max(1.0)
+        in_step / larger(total, 1.0)
     }
 
     /// Every bank's phase as (cosine, sine) times what its events weigh: as much as they are in step, 1 on average, where `coherence` is
     /// [`Self::coherence`].
     pub fn phases(&self, counts: &Counts, coherence: f32) -> [(f32, f32, f32); BANKS] {
-        let mean = coherence.max(LEAST_COHERENCE);
+        let mean = larger(coherence, LEAST_COHERENCE);
         let mut phases = [(0.0, 0.0, 0.0); BANKS];
         for ((phase, (re, im)), count) in phases.iter_mut().zip(self.sums).zip(counts) {
             let count = *count as f32;
             let square = re * re + im * im;
-            let length = sqrt(square).max(f32::MIN_POSITIVE);
-            let weight = sqrt((square - count).max(0.0)) / (count * mean).max(1.0);
+            let length = larger(sqrt(square), f32::MIN_POSITIVE);
+            let weight = sqrt(larger(square - count, 0.0)) / larger(count * mean, 1.0);
             let per = weight / length;
             *phase = (re * per, im * per, weight);
         }
