@@ -129,7 +129,7 @@ impl Icp {
         self.run.iterations = 0;
     }
 
-    /// One iteration. Cost: about 300 instructions a point; 5 to 15 iterations in all.
+    /// One iteration. Cost: about 400 instructions a point; 5 to 15 iterations in all.
     pub fn step(&mut self) -> Progress {
         let back = self.run.there.is_some();
         let (source, target) =

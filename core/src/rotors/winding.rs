@@ -142,7 +142,7 @@ impl Explainer {
         self.best = Winding::default();
     }
 
-    /// Tries a centre; `true` once the best is found. Cost: about 900 instructions a phasor.
+    /// Tries a centre; `true` once the best is found. Cost: about 850 instructions a phasor.
     pub fn step(&mut self) -> bool {
         let steps = if self.halvings == 0 { COARSE_STEPS } else { 1 };
         let x_px = self.from.0 + self.column as f32 * self.spacing_px;

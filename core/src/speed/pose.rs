@@ -292,7 +292,8 @@ impl Pose {
     }
 
     /// Weighs one more segment of the window, or looks at it, or ends a round: corrects the path and learns the template anew;
-    /// `true` once all rounds are done. Cost: about 190 instructions an event, or half a million.
+    /// `true` once all rounds are done. Cost: about 60 instructions an event that is
+    /// looked at, 270 more for one of the rotor's, or half a million.
     pub fn step(&mut self, window: &Window<'_>, sums: &mut Sums, even: &mut Even) -> bool {
         if !self.started {
             // The axis is thought to be at rest yet.
