@@ -67,7 +67,7 @@ pub fn larger(a: f32, b: f32) -> f32 {
     if a < b { b } else { a }
 }
 
-/// The smaller of two numbers, as the same.
+/// The smaller of two numbers, without a call likewise.
 #[must_use]
 pub fn smaller(a: f32, b: f32) -> f32 {
     if b < a { b } else { a }

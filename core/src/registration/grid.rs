@@ -217,23 +217,28 @@ mod tests {
             tau_s: random() * 1e-3,
             on: random() > 0.5,
         };
-        let points: Vec<_> = (0..SLICE_POINTS).map(|_| point()).collect();
-        let mut grid = Grid::EMPTY;
         let metric = Metric { lambda_px_per_s: 5e3, reach_px: 12.0 };
-        grid.build(&points, 85.0, metric);
-        for _ in 0..2_000 {
-            let query = point();
-            let brute = points
-                .iter()
-                .filter(|p| p.on == query.on)
-                .map(|p| {
-                    let dt = (p.tau_s - query.tau_s) * 5e3;
-                    (p.x_px - query.x_px).powi(2) + (p.y_px - query.y_px).powi(2) + dt * dt
-                })
-                .fold(f32::MAX, f32::min);
-            match grid.nearest(query) {
-                Some((_, distance2)) => assert!((distance2 - brute).abs() < 1e-2),
-                None => assert!(brute >= 143.9),
+        // Many and few, whose neighbours are cells away; all on the grid, and most beside it.
+        for (count, reach_px) in
+            [(SLICE_POINTS, 85.0), (24, 85.0), (24, 30.0), (SLICE_POINTS, 30.0)]
+        {
+            let points: Vec<_> = (0..count).map(|_| point()).collect();
+            let mut grid = Grid::EMPTY;
+            grid.build(&points, reach_px, metric);
+            for _ in 0..2_000 {
+                let query = point();
+                let brute = points
+                    .iter()
+                    .filter(|p| p.on == query.on)
+                    .map(|p| {
+                        let dt = (p.tau_s - query.tau_s) * 5e3;
+                        (p.x_px - query.x_px).powi(2) + (p.y_px - query.y_px).powi(2) + dt * dt
+                    })
+                    .fold(f32::MAX, f32::min);
+                match grid.nearest(query) {
+                    Some((_, distance2)) => assert!((distance2 - brute).abs() < 1e-2),
+                    None => assert!(brute >= 143.9),
+                }
             }
         }
     }

@@ -43,13 +43,13 @@ pub struct Cut {
 impl Cut {
     /// Collects the slice, evenly thinned to the most.
     pub fn collect(&self, window: &Window<'_>, disc: Moving<'_>, slice: &mut Slice) {
-        // All that there is room for; it rarely is not enough for all of them.
+        // As they come, while there is room: seldom are there more, which are gone through again.
         let total = self.take(self.most, window, disc, slice);
         if total > SLICE_POINTS {
             self.take(total, window, disc, slice);
         } else if total > self.most {
-            let mut keep = Thinning::new(self.most, total);
-            slice.retain(|_| keep.next());
+            let mut thinning = Thinning::new(self.most, total);
+            slice.retain(|_| thinning.keeps_next());
         }
     }
 
@@ -64,21 +64,21 @@ impl Cut {
         slice: &mut Slice,
     ) -> usize {
         slice.clear();
-        let mut keep = Thinning::new(self.most, of);
+        let mut thinning = Thinning::new(self.most, of);
         for fold in 0..self.folds {
             let start_us = self.start_us + fold as f32 * self.period_us;
             let end_us = start_us + self.length_us;
             // Events are gone through in stretches, which a loop over all of them would not know.
             window.between(start_us as i32, end_us as i32).for_each(|event| {
                 if let Some((x_px, y_px, _)) = disc.place(event)
-                    && keep.next()
+                    && thinning.keeps_next()
                 {
                     let tau_s = (event.since(window.start_us) as f32 - start_us) * 1e-6;
                     slice.push(SlicePoint { x_px, y_px, tau_s, on: window.is_on(event) }).ok();
                 }
             });
         }
-        keep.count
+        thinning.count
     }
 }
 
@@ -87,23 +87,24 @@ impl Cut {
 pub struct Thinning {
     most: usize,
     of: usize,
-    /// How many there were, and which is kept next, by `most` times its number.
+    /// How many there were.
     count: usize,
-    next: usize,
+    /// The next one that is kept: its number times `most`, at least.
+    due: usize,
 }
 
 impl Thinning {
     /// Keeps `most` of `of`.
     #[must_use]
     pub const fn new(most: usize, of: usize) -> Self {
-        Self { most, of, count: 0, next: 0 }
+        Self { most, of, count: 0, due: 0 }
     }
 
     /// Whether the next one is kept.
-    pub const fn next(&mut self) -> bool {
-        let keeps = self.count * self.most >= self.next;
+    pub const fn keeps_next(&mut self) -> bool {
+        let keeps = self.count * self.most >= self.due;
         if keeps {
-            self.next += self.of;
+            self.due += self.of;
         }
         self.count += 1;
         keeps

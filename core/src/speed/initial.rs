@@ -95,7 +95,7 @@ impl Ladder {
     ) -> Taken {
         slice.clear();
         let mut disc = Moving::new(self.disc, path, window);
-        let mut keep = Thinning::new(most, range.len());
+        let mut thinning = Thinning::new(most, range.len());
         let (mut count, mut sum_us, mut from_us, mut to_us) = (0, 0.0_f32, None, 0);
         for event in window.segment(self.segment) {
             let Some((x_px, y_px, _)) = disc.place(*event) else { continue };
@@ -103,7 +103,7 @@ impl Ladder {
                 break;
             }
             count += 1;
-            if count > range.start && keep.next() {
+            if count > range.start && thinning.keeps_next() {
                 let t_us = event.since(window.start_us);
                 slice.push(SlicePoint { x_px, y_px, tau_s: 0.0, on: event.is_on() }).ok();
                 sum_us += t_us as f32;
@@ -128,6 +128,7 @@ impl Ladder {
             };
         }
         if self.level == 0 {
+            // Counted only.
             let all = self.take(window, path, 0..usize::MAX, 0, &mut icp.first);
             self.size = (all.count / SLICES).min(MOST_EVENTS);
             if self.size < LEAST_EVENTS {
