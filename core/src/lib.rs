@@ -14,6 +14,7 @@ pub mod settings;
 pub mod speed;
 pub mod store;
 pub mod tachometer;
+mod thinning;
 pub mod tracker;
 
 pub use event::{Event, Geometry, GyroSample, PackedEvent, Polarity};

@@ -6,4 +6,4 @@ pub mod rigid;
 pub mod slice;
 
 pub use icp::{Icp, Progress, Registered, Residual};
-pub use slice::{Cut, Slice, SlicePoint, Thinning};
+pub use slice::{Cut, Slice, SlicePoint};

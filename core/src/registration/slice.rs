@@ -5,6 +5,7 @@ use heapless::Vec;
 use crate::limits::SLICE_POINTS;
 use crate::speed::path::Moving;
 use crate::store::Window;
+use crate::thinning::Thinning;
 
 /// One event of a slice.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -78,35 +79,6 @@ impl Cut {
                 }
             });
         }
-        thinning.count
-    }
-}
-
-/// Keeps the most of so many, evenly.
-#[derive(Clone, Copy, Debug)]
-pub struct Thinning {
-    most: usize,
-    of: usize,
-    /// How many there were.
-    count: usize,
-    /// The next one that is kept: its number times `most`, at least.
-    due: usize,
-}
-
-impl Thinning {
-    /// Keeps `most` of `of`.
-    #[must_use]
-    pub const fn new(most: usize, of: usize) -> Self {
-        Self { most, of, count: 0, due: 0 }
-    }
-
-    /// Whether the next one is kept.
-    pub const fn keeps_next(&mut self) -> bool {
-        let keeps = self.count * self.most >= self.due;
-        if keeps {
-            self.due += self.of;
-        }
-        self.count += 1;
-        keeps
+        thinning.count()
     }
 }

@@ -13,6 +13,7 @@ use super::coherence::Phasor;
 use super::disc::Disc;
 use crate::limits::WINDING_PHASORS;
 use crate::math::{larger, sqrt};
+use crate::thinning::Thinning;
 
 /// Most windings that are tried: a wheel's spokes, or 8 blades seen at the second overtone.
 const MOST_WINDINGS: usize = 20;
@@ -68,12 +69,9 @@ fn collect(
 ) -> (Region, usize) {
     let mut region = Region::new();
     let total = phasors.clone().filter(&inside).count();
-    let mut next = 0;
-    for (index, phasor) in phasors.filter(&inside).enumerate() {
-        if index * WINDING_PHASORS >= next {
-            region.push(phasor.without_chance()).ok();
-            next += total.max(WINDING_PHASORS);
-        }
+    let mut thinning = Thinning::new(WINDING_PHASORS, total);
+    for phasor in phasors.filter(&inside).filter(|_| thinning.keeps_next()) {
+        region.push(phasor.without_chance()).ok();
     }
     (region, total)
 }

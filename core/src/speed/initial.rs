@@ -13,9 +13,10 @@ use heapless::Vec;
 
 use super::path::{Moving, Path};
 use crate::order::sort_few;
-use crate::registration::{Icp, Progress, Registered, Residual, Slice, SlicePoint, Thinning};
+use crate::registration::{Icp, Progress, Registered, Residual, Slice, SlicePoint};
 use crate::rotors::Disc;
 use crate::store::{WINDOW_SEGMENTS, Window};
+use crate::thinning::Thinning;
 
 /// Events in a slice at best.
 const MOST_EVENTS: usize = 512;
