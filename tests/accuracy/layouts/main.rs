@@ -398,6 +398,25 @@ fn blades_in_step_with_the_lamp() {
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
 }
 
+/// Slow blades under a lamp, which adds its frequency to theirs: as long as less than a period of their own has been seen, the faster
+/// rotor that they then look like must not be told.
+#[test]
+fn a_lamp_makes_no_fast_rotor_of_a_slow_one() {
+    let mut wrong = Vec::new();
+    for (seed, frequency_hz, blades, rpm) in
+        [(84, 100.0, 6, 78.0), (85, 100.0, 6, 78.0), (86, 120.0, 6, -90.0), (87, 120.0, 5, 71.0)]
+    {
+        let lamp = Lamp { frequency_hz, ..dim() };
+        let rotor = Rotor { blades, ..at(173.0, 130.0, 23.0, rpm) };
+        let lit = Scene { lamp: Some(lamp), duration_ms: 160.0, ..scene(seed, vec![rotor]) };
+        for capacity in Capacity::ALL {
+            let name = format!("{rpm} rpm under a lamp, {} memory", capacity.as_str());
+            wrong.extend(run(&lit, capacity).wrong_speeds(&name, false));
+        }
+    }
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+}
+
 /// A lamp with overtones that dims the whole picture a little.
 fn dim() -> Lamp {
     Lamp { depth: 0.12, harmonics: vec![0.3, 0.15], ..Lamp::default() }

@@ -50,6 +50,8 @@ const SLOWEST_HZ: f32 = 200.0;
 const SLOWEST_MARK_HZ: f32 = 100.0;
 /// Its periods in the window from which on speeds a seventh apart are told apart.
 const LEAST_PERIODS: f32 = 14.0;
+/// Length of the window in seconds from which on a frequency is told from those that a lamp makes of it: three of its flashes.
+const LEAST_LIT_S: f32 = 0.03;
 
 impl Measurement {
     /// Asks whether the pattern keeps step with other windings too, or with another speed, of the rotor's own or of a lamp's making: one a
@@ -74,10 +76,14 @@ impl Measurement {
         let uneven = mark || !self.alike;
         let higher = |s| (s, if uneven && s >= 2.0 { MOST_UNEVEN } else { MOST_HIGHER });
         let lit = LAMPS_HZ.map(|lamp_hz| 1.0 + lamp_hz / line_hz);
-        let lower = LOWER.into_iter().chain(lit).map(|s| (s, MOST_LOWER));
-        let mut speeds = HIGHER.map(higher).into_iter().chain(lower).filter(|_| asked);
+        let lit = lit.into_iter().filter(|_| window.duration_us as f32 * 1e-6 > LEAST_LIT_S);
+        let lower = LOWER.map(|s| (s, MOST_LOWER));
+        // However slow the blades are: a lamp makes fast ones of them.
+        let speeds = HIGHER.map(higher).into_iter().chain(lower).filter(|_| asked);
+        let speeds = speeds.map(|(s, most)| (s, most, Reason::TooFast));
+        let mut speeds = speeds.chain(lit.map(|s| (s, MOST_LOWER, Reason::Flicker)));
         let number = turn - self.other_windings.len();
-        let Some((speed, most)) = speeds.nth(number) else {
+        let Some((speed, most, reason)) = speeds.nth(number) else {
             self.turn = 0;
             self.stage = Stage::Pose;
             return;
@@ -85,8 +91,7 @@ impl Measurement {
         let omega_rad_s = speed * self.omega_rad_s;
         let share = Pattern::learn(polar, self.disc, omega_rad_s, self.harmonic).coherence();
         if share > most * self.evidence.coherence.unwrap_or(0.0) {
-            let lamp = number >= HIGHER.len() + LOWER.len();
-            self.refuse(if lamp { Reason::Flicker } else { Reason::TooFast });
+            self.refuse(reason);
         }
     }
 }
