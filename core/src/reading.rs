@@ -16,7 +16,7 @@ pub enum Reason {
     TooFewEvents,
     /// Nothing in view turns.
     NoRotation,
-    /// What changes is the light (mains lamps), not a rotor.
+    /// What changes is the light of a lamp, not a rotor; or it makes a fast rotor of a slow one.
     Flicker,
     /// Two or more speeds explain the events, or the witnesses disagree.
     Ambiguous,

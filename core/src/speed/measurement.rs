@@ -9,7 +9,8 @@ mod verdict;
 use super::angular::AngularSums;
 use super::baseline::{Estimate, Pairs};
 use super::initial::{Ladder, Rates};
-use super::polar::{PolarTrack, track};
+use super::phase::Pattern;
+use super::polar::{PolarEvent, PolarTrack, track};
 use super::pose::{MOVING_PX_S, Pose, Sums, Tilt};
 use super::statistics::root_mean_square;
 use crate::math::TAU;
@@ -225,6 +226,13 @@ impl Measurement {
             Stage::Verdict => "verdict",
             Stage::Done => "done",
         }
+    }
+
+    /// Share of the events that keep step with a speed in an angular harmonic, 0 to 1.
+    // Not inlined: it is called in four places, and flash is short.
+    #[inline(never)]
+    fn in_step(&self, polar: &[PolarEvent], omega_rad_s: f32, harmonic: u32) -> f32 {
+        Pattern::learn(polar, self.disc, omega_rad_s, harmonic).coherence()
     }
 
     fn refuse(&mut self, reason: Reason) {

@@ -403,12 +403,23 @@ fn blades_in_step_with_the_lamp() {
 #[test]
 fn a_lamp_makes_no_fast_rotor_of_a_slow_one() {
     let mut wrong = Vec::new();
-    for seed in [1, 2, 86, 87] {
-        let lamp = Lamp { depth: 0.1, ..dim() };
+    // Mains, and light that flickers faster.
+    let lamps_hz = [
+        (1, 100.0),
+        (2, 100.0),
+        (86, 100.0),
+        (87, 100.0),
+        (1, 250.0),
+        (2, 500.0),
+        (3, 1000.0),
+        (4, 2000.0),
+    ];
+    for (seed, frequency_hz) in lamps_hz {
+        let lamp = Lamp { frequency_hz, depth: 0.1, ..dim() };
         let rotor = Rotor { blades: 6, ..at(173.0, 130.0, 23.0, 78.0) };
         let lit = Scene { lamp: Some(lamp), duration_ms: 160.0, ..scene(seed, vec![rotor]) };
         for capacity in Capacity::ALL {
-            let name = format!("seed {seed} under a lamp, {} memory", capacity.as_str());
+            let name = format!("seed {seed}, {frequency_hz} Hz, {} memory", capacity.as_str());
             wrong.extend(run(&lit, capacity).wrong_speeds(&name, false));
         }
     }

@@ -11,7 +11,7 @@ use crate::speed::angular::AngularSums;
 use crate::speed::baseline::Estimate;
 use crate::speed::initial::{Ladder, median};
 use crate::speed::path::Path;
-use crate::speed::phase::{Pattern, harmonics, newton, scan};
+use crate::speed::phase::{harmonics, newton, scan};
 use crate::speed::polar::{PolarEvent, PolarTrack};
 use crate::speed::symmetry::{symmetry, turn_back};
 use crate::store::{WINDOW_SEGMENTS, Window};
@@ -62,8 +62,7 @@ impl Measurement {
             self.stage = Stage::Track;
             return;
         }
-        let coherence =
-            Pattern::learn(polar, self.disc, self.omega_rad_s, self.harmonic).coherence();
+        let coherence = self.in_step(polar, self.omega_rad_s, self.harmonic);
         self.evidence.coherence = Some(coherence);
         if coherence < self.least_coherence() {
             return self.refuse(Reason::NoRotation);
@@ -169,8 +168,7 @@ impl Measurement {
 
     /// Whether the line is an overtone of the blades' own.
     pub(super) fn overtone(&mut self, polar: &[PolarEvent]) {
-        let at =
-            |harmonic| Pattern::learn(polar, self.disc, self.omega_rad_s, harmonic).coherence();
+        let at = |harmonic| self.in_step(polar, self.omega_rad_s, harmonic);
         let mut share = at(self.harmonic);
         if let Some(parts) = self.parts.map(u32::from).filter(|parts| *parts > 0) {
             let of_parts = at(parts);

@@ -12,13 +12,12 @@
 use super::{Measurement, Stage};
 use crate::math::TAU;
 use crate::reading::Reason;
-use crate::speed::phase::Pattern;
 use crate::speed::polar::PolarEvent;
 use crate::store::Window;
 
 /// Other speeds that are asked, over the one at hand: those that a refractory period of up to three blade periods mistakes
 /// for each other. Jitter hides the higher ones more.
-const HIGHER: [f32; 11] = [
+const SPEEDS: [f32; 15] = [
     8.0 / 7.0,
     7.0 / 6.0,
     6.0 / 5.0,
@@ -30,8 +29,11 @@ const HIGHER: [f32; 11] = [
     5.0 / 3.0,
     2.0,
     3.0,
+    1.0 / 3.0,
+    1.0 / 2.0,
+    3.0 / 5.0,
+    2.0 / 3.0,
 ];
-const LOWER: [f32; 4] = [1.0 / 3.0, 1.0 / 2.0, 3.0 / 5.0, 2.0 / 3.0];
 /// What a lamp that lights the rotor adds to the harmonic's frequency, or takes from it, in Hz.
 const LAMPS_HZ: [f32; 4] = [-120.0, -100.0, 100.0, 120.0];
 /// Share in step with another speed over that with the one at hand from which on either may be the rotor's. With a higher one
@@ -48,10 +50,14 @@ const MOST_OTHER_WINDINGS: f32 = 0.35;
 /// is told, nothing else speaks against that.
 const SLOWEST_HZ: f32 = 200.0;
 const SLOWEST_MARK_HZ: f32 = 100.0;
+/// Periods in the window of blades that are too slow to be told and that a lamp makes fast ones of. Fewer than one are
+/// not told from a rotor that is seen unevenly around.
+const STILL_PERIODS: [f32; 10] = [1.0, 1.5, 2.0, 2.5, 3.0, -1.0, -1.5, -2.0, -2.5, -3.0];
+/// Share in step with these over that with the speed at hand from which on the blades are as slow: lamps make ratios of 0.9 and more,
+/// rigid rotors in random scenes up to 0.73.
+const MOST_STILL: f32 = 0.8;
 /// Its periods in the window from which on speeds a seventh apart are told apart.
 const LEAST_PERIODS: f32 = 14.0;
-/// Length of the window in seconds from which on a frequency is told from those that a lamp makes of it: three of its flashes.
-const LEAST_LIT_S: f32 = 0.03;
 
 impl Measurement {
     /// Asks whether the pattern keeps step with other windings too, or with another speed, of the rotor's own or of a lamp's making: one a
@@ -67,29 +73,31 @@ impl Measurement {
         if let Some(share) = self.other_windings.get(turn) {
             // How unevenly it is seen: the harmonics of where its events are, whenever they came.
             let harmonic = u32::from(self.turn) * self.windings;
-            let unevenly = || Pattern::learn(polar, self.disc, 0.0, harmonic).coherence();
+            let unevenly = || self.in_step(polar, 0.0, harmonic);
             if asked && self.windings > 1 && share - unevenly() > MOST_OTHER_WINDINGS {
                 self.refuse(Reason::TooFast);
             }
             return;
         }
-        let uneven = mark || !self.alike;
-        let higher = |s| (s, if uneven && s >= 2.0 { MOST_UNEVEN } else { MOST_HIGHER });
-        let lit = LAMPS_HZ.map(|lamp_hz| 1.0 + lamp_hz / line_hz);
-        let lit = lit.into_iter().filter(|_| window.duration_us as f32 * 1e-6 > LEAST_LIT_S);
-        let lower = LOWER.map(|s| (s, MOST_LOWER));
-        // However slow the blades are: a lamp makes fast ones of them.
-        let speeds = HIGHER.map(higher).into_iter().chain(lower).filter(|_| asked);
-        let speeds = speeds.map(|(s, most)| (s, most, Reason::TooFast));
-        let mut speeds = speeds.chain(lit.map(|s| (s, MOST_LOWER, Reason::Flicker)));
-        let number = turn - self.other_windings.len();
-        let Some((speed, most, reason)) = speeds.nth(number) else {
-            self.turn = 0;
-            self.stage = Stage::Pose;
-            return;
+        // However slow the blades are, a lamp is asked for: it makes fast ones of them.
+        let number = turn - self.other_windings.len() + if asked { 0 } else { SPEEDS.len() };
+        let (speed, most, reason) = if let Some(&speed) = SPEEDS.get(number) {
+            let uneven = mark || !self.alike;
+            let higher = if uneven && speed >= 2.0 { MOST_UNEVEN } else { MOST_HIGHER };
+            (speed, if speed > 1.0 { higher } else { MOST_LOWER }, Reason::TooFast)
+        } else if let Some(lamp_hz) = LAMPS_HZ.get(number - SPEEDS.len()) {
+            (1.0 + lamp_hz / line_hz, MOST_LOWER, Reason::Flicker)
+        } else {
+            let number = number - SPEEDS.len() - LAMPS_HZ.len();
+            let Some(still) = STILL_PERIODS.get(number).filter(|_| periods > LEAST_PERIODS) else {
+                self.turn = 0;
+                self.stage = Stage::Pose;
+                return;
+            };
+            (still / periods, MOST_STILL, Reason::Flicker)
         };
         let omega_rad_s = speed * self.omega_rad_s;
-        let share = Pattern::learn(polar, self.disc, omega_rad_s, self.harmonic).coherence();
+        let share = self.in_step(polar, omega_rad_s, self.harmonic);
         if share > most * self.evidence.coherence.unwrap_or(0.0) {
             self.refuse(reason);
         }
