@@ -35,7 +35,7 @@ fn phase(event: PolarEvent, rate: TurnRate, harmonic: u32) -> Turn {
 impl Pattern {
     /// Learns the phases at a speed.
     #[must_use]
-    // Not inlined: it is called in five places, and flash is short.
+    // Not inlined: it is called in two places, and flash is short.
     #[inline(never)]
     pub fn learn(track: &[PolarEvent], disc: Disc, omega_rad_s: f32, harmonic: u32) -> Self {
         let rate = TurnRate::from_rad_s(omega_rad_s);

@@ -7,7 +7,8 @@
 //! other windings, too: with none, or as many the other way. A rigid rotor's does so only as far as it is seen unevenly around.
 //!
 //! A lamp that lights the blades in flashes does the same to their frequency: with its own added or taken off, the pattern keeps
-//! step, too. Where it keeps more step so, the frequency at hand is not the blades'.
+//! step, too. Where it keeps more step so, the frequency at hand is not the blades'. Of a lamp of whatever frequency, blades that pass
+//! less than three times in the window are told by the step that their pattern keeps near standstill.
 
 use super::{Measurement, Stage};
 use crate::math::TAU;
