@@ -14,7 +14,7 @@ use crate::store::{Even, Window};
 
 /// Share in step of the second best harmonic over that of the best from which on they are in doubt.
 const DOUBTFUL: f32 = 0.3;
-/// The same where a centre that is off by little leads to another harmonic, which then shows as well.
+/// The same where a centre that is off by little leads to another harmonic, which then shows as well; and of blurred edges.
 const SMALL_DOUBTFUL: f32 = 0.15;
 /// The same after the look about the centre, from which on nothing but edges tells them apart.
 const IN_DOUBT: f32 = 0.6;
@@ -196,6 +196,11 @@ impl Measurement {
     /// Whether there is any doubt: too much where no lock tells a harmonic from its neighbour.
     pub(super) fn doubted(&self) -> bool {
         self.standing() > DOUBTFUL
+    }
+
+    /// Whether another harmonic keeps step at all, so that the centre may be off.
+    pub(super) fn rivalled(&self) -> bool {
+        self.standing() > SMALL_DOUBTFUL
     }
 
     fn standing(&self) -> f32 {

@@ -1,7 +1,7 @@
 //! The verdict on a rotor: what the witnesses say together, and how sure they are.
 
 use super::super::baseline::Estimate;
-use super::baselines::FRACTION;
+use super::baselines::{FRACTION, SAFE_SLIP};
 use super::doubt::SMALL_PX;
 use super::{ACCELERATION_SIGMAS, Measurement, Stated, TILTED_PARTS};
 use crate::math::{TAU, sqrt};
@@ -173,16 +173,20 @@ impl Measurement {
         self.roll_sigma_rad_s = roll;
     }
 
-    /// Whether the lock bears the phase out, and the rotor is where it should be between whole periods.
+    /// Whether the lock bears the phase out, and the rotor is where it should be between whole periods. Not one that scatters over so
+    /// much of a period that it may have slipped one: it agrees with any phase, that of an axis that went astray in a hand, too.
     // Not inlined: it is called in several places.
     #[inline(never)]
     fn bears_out(&self, lock: Estimate, phase: Option<Estimate>) -> bool {
-        phase.is_some_and(|phase| {
-            let apart = (lock.omega_rad_s - phase.omega_rad_s).abs();
-            let (a, b) = (lock.sigma_rad_s, phase.sigma_rad_s);
-            let most = LOCK_SIGMAS * sqrt(a * a + b * b);
-            apart < (LOCK_AGREEMENT * lock.omega_rad_s.abs()).max(most) && self.fits_between()
-        })
+        let parts = (self.pace().parts * self.uncounted()) as f32;
+        let slips = 3.0 * lock.sigma_rad_s * self.lock_baseline_s * parts > SAFE_SLIP * TAU;
+        !slips
+            && phase.is_some_and(|phase| {
+                let apart = (lock.omega_rad_s - phase.omega_rad_s).abs();
+                let (a, b) = (lock.sigma_rad_s, phase.sigma_rad_s);
+                let most = LOCK_SIGMAS * sqrt(a * a + b * b);
+                apart < (LOCK_AGREEMENT * lock.omega_rad_s.abs()).max(most) && self.fits_between()
+            })
     }
 
     /// Adds half of what the witnesses of the lock are apart where that is more than their own scatter explains: the truth may be with
@@ -238,11 +242,14 @@ impl Measurement {
     // Not inlined: it is called in two places.
     #[inline(never)]
     pub(super) fn fits_between(&self) -> bool {
-        // Where the parts were not counted, they are at least as many as the windings of the line.
-        let parts = if self.parts.is_none() { self.windings.max(1) } else { 1 };
         let half_way = 0.5 * FRACTION / (self.windings as f32 + 1.0);
         let most = if self.doubted() { half_way.max(MOST_DEVIATION) } else { MOST_CLEAR_DEVIATION };
-        self.evidence.fractional_deviation.is_some_and(|d| d * (parts as f32) < most)
+        self.evidence.fractional_deviation.is_some_and(|d| d * (self.uncounted() as f32) < most)
+    }
+
+    /// Parts in what counts as one: where they were not counted, at least as many as the windings of the line.
+    fn uncounted(&self) -> u32 {
+        if self.parts.is_none() { self.windings.max(1) } else { 1 }
     }
 
     /// Share of the events that a rotor of this speed keeps in step at least.
@@ -259,12 +266,13 @@ impl Measurement {
     }
 
     /// Whether the rotor has edges: what merely keeps step with one frequency has none, and a wrong harmonic about a wrong
-    /// centre has no overtone.
+    /// centre has no overtone. It blurs them, too: where another harmonic keeps step at all, noise is no excuse.
     pub(super) fn has_edges(&self) -> bool {
         if self.in_doubt() {
             return false;
         }
-        self.too_fast_for_edges() || self.edges_px() < self.blur_px(MOST_BLUR)
+        let blur_px = if self.rivalled() { self.pose.sharpness_px() } else { self.edges_px() };
+        self.too_fast_for_edges() || blur_px < self.blur_px(MOST_BLUR)
     }
 
     /// Whether so many events keep step as do at this speed, which was asked before, and no more is to be seen.
