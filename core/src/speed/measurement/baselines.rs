@@ -45,7 +45,7 @@ const LOCK_SHARE: f32 = 2.0 / 3.0;
 const LEAST_START: f32 = 1e-3;
 const MOST_START: f32 = 1e-2;
 /// A step to m periods is safe while three standard errors stay below this share of a period.
-pub(super) const SAFE_SLIP: f32 = 0.33;
+const SAFE_SLIP: f32 = 0.33;
 
 impl Measurement {
     pub(super) fn pace(&self) -> Pace {
