@@ -15,12 +15,12 @@ use crate::tachometer::BASE_WINDOW_US;
 const LEAST_COHERENCE: f32 = 0.2;
 /// One of fewer than so many times that is faint: unless it is read, nothing says that it turns.
 const FAINT: f32 = 1.5;
-/// The same as the next, noise and all, where another harmonic keeps step.
-const MOST_RIVALLED_BLUR: (f32, f32) = (0.11, 1.65);
 /// Blur of the rotor's edges, as a share of its radius and in pixels for a small one, beyond which they are no edges;
 /// and within which they are so sharp that a registration that went astray does not count against them.
 const MOST_BLUR: (f32, f32) = (0.1, 1.5);
 const LEAST_BLUR: (f32, f32) = (0.06, 1.3);
+/// Blur, noise and all, beyond which they are none where another harmonic keeps step.
+const MOST_RIVALLED_BLUR: (f32, f32) = (0.11, 1.65);
 /// Standard deviation of the events' times in dim light.
 const MOST_JITTER_S: f32 = 200e-6;
 /// Scatter of a phase by that jitter beyond which a registration is not believed where it contradicts.
@@ -51,7 +51,7 @@ const ASTRAY_SIGMAS: f32 = 4.0;
 /// A lock with a larger relative error is only coarse.
 const MOST_LOCK_SIGMA: f32 = 3e-3;
 /// Standard error of a lock in symmetry periods from which on it may have slipped one: half a period is three of it. In random scenes of small
-/// rotors in a hand five in a thousand right ones reach it, and all of eight that bore out a wrong speed.
+/// rotors in a hand four in a thousand right ones reach it, and seven of eight that bore out a wrong speed.
 const MOST_SLIP: f32 = 0.15;
 /// Relative error to which a lock that does not go along the phase's path is believed whatever the phase's is.
 const OWN_SIGMA: f32 = 1e-3;
@@ -282,12 +282,9 @@ impl Measurement {
         if self.in_doubt() {
             return false;
         }
-        let (edges_px, most) = if self.rivalled() {
-            (self.pose.sharpness_px(), MOST_RIVALLED_BLUR)
-        } else {
-            (self.edges_px(), MOST_BLUR)
-        };
-        self.too_fast_for_edges() || edges_px < self.blur_px(most)
+        let sharp = || self.pose.sharpness_px() < self.blur_px(MOST_RIVALLED_BLUR);
+        self.too_fast_for_edges()
+            || self.edges_px() < self.blur_px(MOST_BLUR) && (!self.rivalled() || sharp())
     }
 
     /// Whether so many events keep step as do at this speed, which was asked before, and no more is to be seen.
