@@ -10,6 +10,7 @@ use evtach_host::recording::{self, ImuSample, OpenOptions};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::how::parse_roi;
+use super::keep_apart;
 use super::wait::LONGEST_US;
 
 /// Arguments of `evtach convert`.
@@ -50,9 +51,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             args.output.display()
         );
     };
-    if is_same_file(&args.input, &args.output) {
-        bail!("input and output are the same file\nhelp: write to another name");
-    }
+    keep_apart(&args.input, &args.output)?;
     let name = args.input.display().to_string();
     let options = OpenOptions { geometry: args.geometry };
     let mut recording = recording::open(&args.input, &options).with_context(|| name.clone())?;
@@ -98,13 +97,6 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     match failure {
         Some(error) => Err(error).with_context(|| name),
         None => Ok(ExitCode::SUCCESS),
-    }
-}
-
-fn is_same_file(input: &Path, output: &Path) -> bool {
-    match (input.canonicalize(), output.canonicalize()) {
-        (Ok(input), Ok(output)) => input == output && input.is_file(),
-        _ => false,
     }
 }
 

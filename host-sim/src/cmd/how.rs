@@ -26,7 +26,7 @@ pub struct How {
     #[arg(long, value_enum, default_value = "full")]
     pub capacity: Capacity,
     /// One standard deviation of the camera clock's error.
-    #[arg(long, value_name = "PPM", default_value_t = 15.0)]
+    #[arg(long, value_name = "PPM", default_value_t = 15.0, value_parser = parse_sigma)]
     pub clock_ppm: f32,
     /// Take the camera's own roll out of the speed by the recording's gyro, where it has one.
     ///

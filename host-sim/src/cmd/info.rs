@@ -4,7 +4,6 @@ mod spectrum;
 mod statistics;
 
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -12,6 +11,7 @@ use anyhow::Context;
 use evtach_core::{Event, Geometry};
 use evtach_host::recording::{self, ImuSample, OpenOptions, Recording};
 
+use super::say;
 use statistics::{Count, Statistics, Timeline};
 
 /// Arguments of `evtach info`.
@@ -59,12 +59,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let mut text = if index > 0 { "\n".to_owned() } else { String::new() };
         // Writing into a string does not fail.
         let _ = report(&mut text, &name, &recording, &statistics, &imu);
-        match std::io::stdout().write_all(text.as_bytes()) {
-            Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => {
-                return Ok(ExitCode::SUCCESS);
-            }
-            other => other?,
-        }
+        say(&text)?;
         result.with_context(|| name)?;
     }
     Ok(ExitCode::SUCCESS)

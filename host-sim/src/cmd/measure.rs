@@ -13,7 +13,11 @@ use evtach_host::measure::{
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::how::How;
+use super::say;
 use super::wait::Wait;
+
+/// A recording is refused where more than one of so many of its events stepped back in time.
+const MOST_OUT_OF_ORDER: u64 = 10;
 
 /// Arguments of `evtach measure`.
 #[derive(clap::Args)]
@@ -149,12 +153,19 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
     if ignored.out_of_order > 0 {
         eprintln!("{name}: {} events stepped back in time and were left out", ignored.out_of_order);
     }
-    facts.lost = recording.lost();
+    // What is left of a shuffled recording comes in bursts that fit any speed.
+    if ignored.out_of_order > facts.events / MOST_OUT_OF_ORDER {
+        bail!(
+            "{name}: the recording is not in time order; sort its events by time, then measure again"
+        );
+    }
+    facts.lost = recording.lost() + ignored.out_of_order;
     let summary = summarise(&readings, &(facts.first_us..facts.last_us), args.how.clock_ppm);
     if args.json {
-        println!("{}", serde_json::to_string(&Document::new(&facts, &summary, &readings))?);
+        let document = Document::new(&facts, &summary, &readings);
+        say(&format!("{}\n", serde_json::to_string(&document)?))?;
     } else {
-        print!("{}", table(&facts, &summary, &readings));
+        say(&table(&facts, &summary, &readings))?;
     }
     if args.verbose {
         eprint!("{}", evidence(&readings, facts.first_us));

@@ -1,5 +1,10 @@
 //! One file per subcommand.
 
+use std::io::{ErrorKind, Write as _};
+use std::path::Path;
+
+use anyhow::{Context as _, bail};
+
 pub mod bench;
 pub mod convert;
 mod how;
@@ -10,3 +15,27 @@ pub mod screen;
 pub mod synth;
 mod wait;
 pub mod watch;
+
+/// Refuses to write over what is read, by whatever name.
+fn keep_apart(input: &Path, output: &Path) -> anyhow::Result<()> {
+    // What is not there yet is no other's file.
+    if input.is_file() && same_file::is_same_file(input, output).unwrap_or(false) {
+        bail!(
+            "{} is the same file as {}\nhelp: write to another name",
+            output.display(),
+            input.display()
+        );
+    }
+    Ok(())
+}
+
+/// Prints an answer. Where there is no room for it, that is an error as any other; where nobody reads any more, it is none.
+fn say(answer: &str) -> anyhow::Result<()> {
+    let mut stdout = std::io::stdout().lock();
+    match stdout.write_all(answer.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(error).context("standard output")
+        }
+        _ => Ok(()),
+    }
+}

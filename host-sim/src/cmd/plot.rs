@@ -9,6 +9,7 @@ use evtach_host::measure::{FileFacts, measure_events, summarise};
 use evtach_host::report::{Subject, heat_map, html};
 
 use super::how::How;
+use super::{keep_apart, say};
 
 /// Arguments of `evtach plot`.
 #[derive(clap::Args)]
@@ -30,6 +31,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         None if args.file == Path::new("-") => bail!("stdin has no name: say where to with --out"),
         None => args.file.with_extension("html"),
     };
+    keep_apart(&args.file, &out)?;
     let mut recording = args.how.open(&args.file)?;
     let mut events: Vec<Event> = Vec::new();
     let mut gyro: Vec<GyroSample> = Vec::new();
@@ -79,7 +81,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let drawn = if alone { heat_map(&subject)? } else { html(&subject)? };
     std::fs::write(&out, drawn)
         .with_context(|| format!("{}: cannot be written; choose --out", out.display()))?;
-    println!("{}", out.display());
+    say(&format!("{}\n", out.display()))?;
     let spoken = summary.rotors.iter().any(|rotor| rotor.speed.is_some());
     Ok(ExitCode::from(u8::from(!spoken)))
 }

@@ -11,6 +11,8 @@ use evtach_host::frame::Frame;
 use evtach_host::play::play;
 use evtach_host::recording::{self, OpenOptions};
 
+use super::{keep_apart, say};
+
 /// Arguments of `evtach screen`.
 #[derive(clap::Args)]
 pub struct Args {
@@ -93,6 +95,7 @@ impl Args {
 
 /// Runs the subcommand: 0 when the screen shows a speed, else 1.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    keep_apart(&args.file, &args.out)?;
     let name = args.file.display().to_string();
     let mut recording = recording::open(&args.file, &OpenOptions { geometry: args.geometry })
         .with_context(|| name.clone())?;
@@ -113,6 +116,6 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         || view.state.advice().to_owned(),
         |speed| format!("{} ± {} {}", speed.value, speed.error, view.preferences.unit.as_str()),
     );
-    println!("{}: {} {}", args.out.display(), view.state.word(), shown);
+    say(&format!("{}: {} {}\n", args.out.display(), view.state.word(), shown))?;
     Ok(ExitCode::from(u8::from(view.speed.is_none())))
 }

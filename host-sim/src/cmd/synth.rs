@@ -23,6 +23,7 @@ use evtach_host::synth::presets::Preset;
 use evtach_host::synth::{Model, Scene, Synthetic, generate};
 use serde_json::Value;
 
+use super::{keep_apart, say};
 use args::{BackdropArgs, MotionArgs, RotorArgs, SensorArgs, set};
 
 /// Arguments of `evtach synth`.
@@ -71,7 +72,7 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scene = scene(args)?;
     if args.print_scene {
-        println!("{}", serde_json::to_string_pretty(&scene)?);
+        say(&format!("{}\n", serde_json::to_string_pretty(&scene)?))?;
         return Ok(ExitCode::SUCCESS);
     }
     let Some(format) = args.format.or_else(|| WriteFormat::from_path(&args.out)) else {
@@ -94,6 +95,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     writer.finish()?;
     let truth = args.truth.clone().or_else(|| truth_path(&args.out));
     if let Some(path) = &truth {
+        keep_apart(&args.out, path)?;
         write_truth(path, &made)?;
     }
     report(&args.out, format, &made, truth.as_deref());

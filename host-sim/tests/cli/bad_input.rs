@@ -251,3 +251,31 @@ fn nothing_inside_the_region() {
     let run = evtach(&["measure", "--start", "100", &good], b"");
     assert_refused_as_bad(&run, "widen");
 }
+
+#[test]
+fn a_shuffled_recording_is_refused() {
+    let folder = folder();
+    let mut events = rotor();
+    // As a reader does that sorts by pixel what it reads at once.
+    for block in events.chunk_by_mut(|a, b| a.t_us / 4_000 == b.t_us / 4_000) {
+        block.sort_by_key(|event| (event.y, event.x, event.t_us));
+    }
+    assert_refused_as_bad(&measure(&write(&folder, "shuffled.npy", &events)), "not in time order");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn no_room_for_the_answer() {
+    let folder = folder();
+    let path = write(&folder, "rotor.raw", &rotor());
+    let full = std::fs::File::options().write(true).open("/dev/full").expect("Linux has it");
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_evtach"))
+        .arg("measure")
+        .arg(&path)
+        .stdout(full)
+        .output()
+        .expect("evtach starts");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    assert!(stderr.contains("standard output: No space left"), "{stderr}");
+}

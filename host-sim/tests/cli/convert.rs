@@ -83,6 +83,13 @@ fn bad_use_is_told() {
     let from = file(&folder, "in.csv", WriteFormat::Csv, &rotor());
     let other = folder.path().join("out.xyz").display().to_string();
     assert_refused_as_bad(&evtach(&["convert", &from, &from], b""), "the same file");
+    let linked = folder.path().join("linked.csv").display().to_string();
+    std::fs::hard_link(&from, &linked).expect("a folder that takes links");
+    let before = std::fs::read(&from).expect("the recording");
+    assert_refused_as_bad(&evtach(&["convert", &from, &linked], b""), "the same file");
+    assert_refused_as_bad(&evtach(&["plot", &from, "--out", &linked], b""), "the same file");
+    assert_refused_as_bad(&evtach(&["screen", &from, &from], b""), "the same file");
+    assert!(std::fs::read(&from).expect("the recording") == before, "the recording is as it was");
     assert_refused_as_bad(&evtach(&["convert", &from, &other], b""), "--to");
     assert_refused_as_bad(&evtach(&["convert", &from, "-", "--to", "npy"], b""), "unknown length");
 }
