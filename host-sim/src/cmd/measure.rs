@@ -13,11 +13,8 @@ use evtach_host::measure::{
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::how::How;
-use super::say;
 use super::wait::Wait;
-
-/// A recording is refused where more than one of so many of its events stepped back in time.
-const MOST_OUT_OF_ORDER: u64 = 10;
+use super::{in_order, say};
 
 /// Arguments of `evtach measure`.
 #[derive(clap::Args)]
@@ -153,12 +150,7 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
     if ignored.out_of_order > 0 {
         eprintln!("{name}: {} events stepped back in time and were left out", ignored.out_of_order);
     }
-    // What is left of a shuffled recording comes in bursts that fit any speed.
-    if ignored.out_of_order > facts.events / MOST_OUT_OF_ORDER {
-        bail!(
-            "{name}: the recording is not in time order; sort its events by time, then measure again"
-        );
-    }
+    in_order(&recording, &name)?;
     facts.lost = recording.lost() + ignored.out_of_order;
     let summary = summarise(&readings, &(facts.first_us..facts.last_us), args.how.clock_ppm);
     if args.json {

@@ -4,6 +4,7 @@ use std::io::{ErrorKind, Write as _};
 use std::path::Path;
 
 use anyhow::{Context as _, bail};
+use evtach_host::recording::Recording;
 
 pub mod bench;
 pub mod convert;
@@ -24,6 +25,16 @@ fn keep_apart(input: &Path, output: &Path) -> anyhow::Result<()> {
             "{} is the same file as {}\nhelp: write to another name",
             output.display(),
             input.display()
+        );
+    }
+    Ok(())
+}
+
+/// Refuses a recording, once it is read, of which no speed would be right.
+fn in_order(recording: &Recording, name: &str) -> anyhow::Result<()> {
+    if recording.is_shuffled() {
+        bail!(
+            "{name}: the recording is not in time order; sort its events by time, then try again"
         );
     }
     Ok(())

@@ -9,7 +9,7 @@ use evtach_host::measure::{FileFacts, measure_events, summarise};
 use evtach_host::report::{Subject, heat_map, html};
 
 use super::how::How;
-use super::{keep_apart, say};
+use super::{in_order, keep_apart, say};
 
 /// Arguments of `evtach plot`.
 #[derive(clap::Args)]
@@ -49,6 +49,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             break;
         }
     }
+    in_order(&recording, &name)?;
     let (Some(first), Some(last)) = (events.first(), events.last()) else {
         bail!(
             "{name}: the recording holds no events; record again, or check the format with `evtach info`"

@@ -11,7 +11,7 @@ use evtach_host::frame::Frame;
 use evtach_host::play::play;
 use evtach_host::recording::{self, OpenOptions};
 
-use super::{keep_apart, say};
+use super::{in_order, keep_apart, say};
 
 /// Arguments of `evtach screen`.
 #[derive(clap::Args)]
@@ -104,7 +104,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     let mut instrument = Instrument::new(args.preferences());
     let until_us = args.at.map(|seconds| (seconds.max(0.0) * 1e6) as u64);
-    play(&mut recording, &mut instrument, until_us).with_context(|| name)?;
+    play(&mut recording, &mut instrument, until_us).with_context(|| name.clone())?;
+    in_order(&recording, &name)?;
     for action in args.actions() {
         instrument.act(action);
     }

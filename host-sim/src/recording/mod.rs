@@ -99,6 +99,7 @@ pub struct Recording {
     source: Box<dyn Source>,
     progress: Progress,
     side: Side,
+    delivered: u64,
     out_of_order: u64,
     out_of_bounds: u64,
     last_us: u64,
@@ -109,6 +110,8 @@ pub struct Recording {
 impl Recording {
     /// Events kept from growing without bound when a reader hands out little at a time.
     const CHUNK_EVENTS: usize = 16_384;
+    /// More than one step back in so many events is no time order.
+    const SHUFFLED_ONE_OF: u64 = 10;
 
     fn new(opened: Opened, geometry: Geometry, progress: Progress) -> Self {
         Self {
@@ -119,6 +122,7 @@ impl Recording {
             source: opened.source,
             progress,
             side: Side::default(),
+            delivered: 0,
             out_of_order: 0,
             out_of_bounds: 0,
             last_us: 0,
@@ -184,6 +188,7 @@ impl Recording {
                 last_us = event.t_us;
             }
         }
+        self.delivered += (events.len() - first) as u64;
         self.out_of_order += steps_back;
         self.last_us = last_us;
     }
@@ -192,6 +197,13 @@ impl Recording {
     #[must_use]
     pub const fn out_of_order(&self) -> u64 {
         self.out_of_order
+    }
+
+    /// Whether so many events stepped back in time that the rest are no sample of what was recorded, but bursts that fit any
+    /// speed. A clock that was set back once is no such thing.
+    #[must_use]
+    pub const fn is_shuffled(&self) -> bool {
+        self.out_of_order > self.delivered / Self::SHUFFLED_ONE_OF
     }
 
     /// Events so far that lay outside the sensor and were left out.

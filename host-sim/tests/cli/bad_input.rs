@@ -260,7 +260,26 @@ fn a_shuffled_recording_is_refused() {
     for block in events.chunk_by_mut(|a, b| a.t_us / 4_000 == b.t_us / 4_000) {
         block.sort_by_key(|event| (event.y, event.x, event.t_us));
     }
-    assert_refused_as_bad(&measure(&write(&folder, "shuffled.npy", &events)), "not in time order");
+    let path = write(&folder, "shuffled.npy", &events);
+    assert_refused_as_bad(&measure(&path), "not in time order");
+    let (path, out) = (path.display().to_string(), folder.path().join("out").display().to_string());
+    // Of a part of it no speed is right either.
+    assert_refused_as_bad(&evtach(&["measure", "--end", "0.1", &path], b""), "not in time order");
+    assert_refused_as_bad(&evtach(&["plot", &path, "--out", &out], b""), "not in time order");
+    assert_refused_as_bad(&evtach(&["screen", &path, &out], b""), "not in time order");
+}
+
+#[test]
+fn a_clock_that_is_set_back_once_leaves_the_rest_as_it_was() {
+    let folder = folder();
+    let mut events = rotor();
+    let end_us = events.last().map_or(0, |event| event.t_us);
+    let set_back = |event: &Event| Event { t_us: event.t_us + end_us - end_us / 3, ..*event };
+    let again: Vec<Event> = events.iter().map(set_back).collect();
+    events.extend(again);
+    let run = measure(&write(&folder, "set_back.npy", &events));
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert!(run.stderr.contains("stepped back in time"), "{}", run.stderr);
 }
 
 #[cfg(target_os = "linux")]
