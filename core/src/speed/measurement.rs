@@ -351,6 +351,7 @@ impl Measurement {
             },
             parts: self.parts,
             alike: self.alike,
+            lapsed: self.pose.lapsed(),
             speed,
             roll_sigma_rad_s: self.roll_sigma_rad_s,
             evidence: self.evidence,
@@ -370,6 +371,8 @@ pub struct Outcome {
     pub parts: Option<u8>,
     /// Whether the parts are alike.
     pub alike: bool,
+    /// Whether it was out of step for a part of the window: then its speed holds for the rest, and is not told as that of the window.
+    pub lapsed: bool,
     /// Speed relative to the camera, unless refused; camera roll is not in its error.
     pub speed: Option<Speed>,
     /// Standard deviation of the camera's mean roll rate in rad/s, from how the centre wanders.

@@ -27,7 +27,7 @@ use crate::rotors::Disc;
 use crate::store::{Even, Window};
 use blocks::{
     BLOCK_SHARE, Block, LEAST_SHARE, MOST_FINE_WALK, MOST_WALK, WALK_PX, WALK_SINGLE_PX,
-    WALK_TWO_PX, WALK_US, Walk, correct,
+    WALK_TWO_PX, WALK_US, Walk, correct, lapsed,
 };
 use schedule::{Phase, SETTLED_PX, Schedule};
 use sides::{Inverted, Sides};
@@ -135,6 +135,7 @@ pub struct Pose {
     slope: Option<Slope>,
     /// Whether the trend of what pixels told once they had settled is to come.
     trending: bool,
+    lapsed: bool,
 }
 
 impl Pose {
@@ -179,6 +180,7 @@ impl Pose {
             segment: 0,
             slope: None,
             trending: false,
+            lapsed: false,
         }
     }
 
@@ -227,6 +229,12 @@ impl Pose {
     #[must_use]
     pub const fn harmonic(&self) -> u32 {
         self.harmonic
+    }
+
+    /// Whether the rotor was out of step for a part of the window, as it stood still meanwhile or turned with another speed.
+    #[must_use]
+    pub const fn lapsed(&self) -> bool {
+        self.lapsed
     }
 
     /// Share of the events in step at the harmonic that the rotor was found by.
@@ -348,8 +356,13 @@ impl Pose {
         if self.schedule.asks_sides() && !self.inverted.learn(&sums.sides) {
             self.schedule.ask_no_sides();
         }
+        let last = self.schedule.phase() == Phase::Last;
+        if last {
+            let blocks = sums.blocks.get(..self.path.blocks()).unwrap_or_default();
+            self.lapsed = lapsed(blocks, self.least_share(), self.in_period);
+        }
         self.sift(sums);
-        if self.schedule.phase() == Phase::Last {
+        if last {
             self.slope = self.trend_after(0.0, sums);
             return true;
         }
@@ -448,9 +461,14 @@ impl Pose {
         self.schedule.again();
     }
 
+    /// Share of a block's events in step below which it is not believed.
+    fn least_share(&self) -> f32 {
+        (BLOCK_SHARE * self.coherence).max(LEAST_SHARE)
+    }
+
     /// Leaves out blocks that are not in step with the rest: the path between their neighbours brings them back.
     fn sift(&self, sums: &mut Sums) {
-        let least = (BLOCK_SHARE * self.coherence).max(LEAST_SHARE);
+        let least = self.least_share();
         for block in &mut sums.blocks {
             if block.share() < least {
                 *block = Block::EMPTY;

@@ -11,7 +11,7 @@ use crate::reading::{Evidence, Frame, Reading, Reason, RotorReading, Status};
 use crate::rotors::Disc;
 use crate::rotors::extraction::InStep;
 use crate::speed::measurement::Outcome;
-use crate::store::WINDOW_SEGMENTS;
+use crate::store::{Account, WINDOW_SEGMENTS};
 
 /// Windows that an adapting window steps through.
 const WINDOWS_US: [u32; 9] = [
@@ -77,21 +77,18 @@ impl Tachometer<'_> {
             let id = self.tracker.identify(outcome, start_us, window_us);
             rotors.push(rotor_reading(id, outcome, self.settings.blades, roll)).ok();
         }
+        // What rested for a part of the window, or turned with another speed there, is followed all the same, but not told.
+        let known = self.best_status(&account, &rotors);
+        for (rotor, outcome) in rotors.iter_mut().zip(&self.outcomes) {
+            if outcome.lapsed && rotor.speed.take().is_some() {
+                rotor.status = Status::Refused(Reason::Ambiguous);
+            }
+        }
         sort_few(&mut rotors, |a, b| a.id < b.id);
-        let lost =
-            account.lost as f32 > MOST_LOST * account.counted.saturating_add(account.lost) as f32;
-        let status = if account.counted == 0 {
-            Status::Refused(Reason::NoEvents)
-        } else if account.counted < LEAST_EVENTS {
-            Status::Refused(Reason::TooFewEvents)
-        } else if lost && rotors.iter().all(|rotor| rotor.speed.is_none()) {
-            Status::Refused(Reason::Saturated)
-        } else {
-            best_status(&rotors, self.in_step)
-        };
+        let status = self.best_status(&account, &rotors);
         // What was locked and does not lock in a window that is long for the sake of something else is told by the next short one.
-        let lost_to_look = self.looks_beside() && status != Status::Locked;
-        self.move_on(Some(status));
+        let lost_to_look = self.looks_beside() && known != Status::Locked;
+        self.move_on(Some(known));
         // Of what came into view late this window may hold little, and much of what a hand moved there before, which leads path and
         // registrations astray together: the short one that begins now tells.
         let came_late = self.anew_us.is_some() && self.stretch == Stretch::Tried;
@@ -105,6 +102,34 @@ impl Tachometer<'_> {
             status,
             rotors,
         })
+    }
+
+    /// The best status among the rotors, or why there is none.
+    // Not inlined: it is asked twice.
+    #[inline(never)]
+    fn best_status(&self, account: &Account, rotors: &[RotorReading]) -> Status {
+        let lost =
+            account.lost as f32 > MOST_LOST * account.counted.saturating_add(account.lost) as f32;
+        let has = |status: Status| rotors.iter().any(|rotor| rotor.status == status);
+        if account.counted == 0 {
+            Status::Refused(Reason::NoEvents)
+        } else if account.counted < LEAST_EVENTS {
+            Status::Refused(Reason::TooFewEvents)
+        } else if lost && rotors.iter().all(|rotor| rotor.speed.is_none()) {
+            Status::Refused(Reason::Saturated)
+        } else if has(Status::Locked) {
+            Status::Locked
+        } else if has(Status::Coarse) {
+            Status::Coarse
+        } else if let Some(first) = rotors.first() {
+            first.status
+        } else {
+            Status::Refused(match self.in_step {
+                Some(InStep::TooFast) => Reason::TooFast,
+                Some(InStep::AllOver(hz)) if is_mains(hz) => Reason::Flicker,
+                _ => Reason::NoRotation,
+            })
+        }
     }
 
     /// Chooses the next window: longer while a rotor or the search needs it, else a hop further.
@@ -257,24 +282,6 @@ fn rotor_reading(
     // Without polarity leading and trailing edges look alike: they may be twice as many.
     let blades = if outcome.found.ignores_polarity { stated } else { outcome.parts };
     RotorReading { id, x_px, y_px, radius_px, blades, status, speed, evidence }
-}
-
-/// The best status among the rotors, or why there is none.
-fn best_status(rotors: &[RotorReading], in_step: Option<InStep>) -> Status {
-    let has = |status: Status| rotors.iter().any(|rotor| rotor.status == status);
-    if has(Status::Locked) {
-        Status::Locked
-    } else if has(Status::Coarse) {
-        Status::Coarse
-    } else if let Some(first) = rotors.first() {
-        first.status
-    } else {
-        Status::Refused(match in_step {
-            Some(InStep::TooFast) => Reason::TooFast,
-            Some(InStep::AllOver(hz)) if is_mains(hz) => Reason::Flicker,
-            _ => Reason::NoRotation,
-        })
-    }
 }
 
 /// Whether a frequency is twice that of the mains, or a multiple: lamps.

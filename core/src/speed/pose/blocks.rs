@@ -158,6 +158,35 @@ impl Block {
     }
 }
 
+/// Blocks one behind another that chance leaves out of step: in random scenes of steady rotors.
+const LEAST_LAPSE: usize = 2;
+/// Share of the events in step over so many blocks, over that below which one is not believed, from which down there is no rotor in them:
+/// in random scenes of steady rotors it is 0.8 and more.
+const DEEP: f32 = 0.6;
+/// A lapse so deep lasts for a symmetry period, and for this part of the window.
+const DEEP_ONE_OF: usize = 8;
+
+/// Whether the rotor was out of step for longer than a symmetry period of so many blocks and than chance makes, as it stood still meanwhile or
+/// turned with another speed: blocks one behind another with less than a share in step, or some that hold no rotor together where each
+/// may be in step by chance.
+pub fn lapsed(blocks: &[Block], least: f32, in_period: usize) -> bool {
+    let together = in_period.max(blocks.len() / DEEP_ONE_OF).max(LEAST_LAPSE);
+    let (mut run, mut longest, mut deep) = (0, 0, false);
+    let (mut in_step, mut count) = (0.0, 0.0);
+    for (index, block) in blocks.iter().enumerate() {
+        run = if block.share() < least { run + 1 } else { 0 };
+        longest = longest.max(run);
+        in_step += block.in_step;
+        count += block.count;
+        if let Some(gone) = index.checked_sub(together).and_then(|gone| blocks.get(gone)) {
+            in_step -= gone.in_step;
+            count -= gone.count;
+        }
+        deep |= index + 1 >= together && in_step < DEEP * least * count;
+    }
+    deep || longest > in_period.max(LEAST_LAPSE)
+}
+
 /// How a path is corrected.
 #[derive(Clone, Copy, Debug)]
 pub struct Walk {
@@ -233,4 +262,33 @@ pub fn correct(path: &mut Path, blocks: &[Block; MAX_KNOTS], walk: Walk) -> Opti
         knot.turn_rad += turn_rad;
     }
     Some(most_px)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Blocks of so many events each, with these shares of them in step.
+    fn blocks<const N: usize>(count: f32, shares: [f32; N]) -> [Block; N] {
+        shares.map(|share| Block { count, in_step: share * count, ..Block::EMPTY })
+    }
+
+    #[test]
+    fn blocks_out_of_step_one_behind_another_are_a_lapse() {
+        let mut shares = [0.8; 12];
+        assert!(!lapsed(&blocks(40.0, shares), 0.3, 2));
+        [0, 4, 5, 6, 11].into_iter().for_each(|block| shares[block] = 0.2);
+        assert!(lapsed(&blocks(40.0, shares), 0.3, 2));
+        // Of four blocks each time, which make a period, the others are in step.
+        assert!(!lapsed(&blocks(40.0, shares), 0.3, 4));
+        assert!(!lapsed(&[], 0.3, 2));
+    }
+
+    #[test]
+    fn blocks_in_step_by_chance_hold_no_rotor_together() {
+        let chance = [0.8, 0.8, 0.8, 0.8, 0.8, 0.8, -0.4, 0.4, -0.1, 0.35, -0.2, 0.4];
+        assert!(lapsed(&blocks(4.0, chance), 0.3, 4));
+        // The same by themselves are but a period.
+        assert!(!lapsed(&blocks(4.0, [0.8, -0.4, 0.4, 0.8]), 0.3, 4));
+    }
 }
