@@ -301,7 +301,7 @@ impl Measurement {
                 self.alpha_rad_s2 = Some(found.alpha_rad_s2);
             }
         }
-        if !self.has_edges() {
+        if !self.has_edges(window.ignores_polarity) {
             return self.refuse(Reason::Ambiguous);
         }
         if !self.follows {

@@ -277,14 +277,24 @@ impl Measurement {
     }
 
     /// Whether the rotor has edges: what merely keeps step with one frequency has none, and a wrong harmonic about a wrong
-    /// centre has no overtone. It blurs them, too: where another harmonic keeps step at all, noise is no excuse.
-    pub(super) fn has_edges(&self) -> bool {
+    /// centre has no overtone. It blurs them, too: where another harmonic keeps step at all, noise is no excuse, nor is jitter where that of
+    /// a rotor that is not small is in doubt. Without polarity leading edges are matched with trailing ones, so that only sharp ones tell.
+    pub(super) fn has_edges(&self, ignores_polarity: bool) -> bool {
         if self.in_doubt() {
             return false;
         }
-        let sharp = || self.pose.sharpness_px() < self.blur_px(MOST_RIVALLED_BLUR);
-        self.too_fast_for_edges()
-            || self.edges_px() < self.blur_px(MOST_BLUR) && (!self.rivalled() || sharp())
+        let radius_px = self.disc.radius_px;
+        let most_px = if !self.doubted() {
+            self.blur_px(MOST_RIVALLED_BLUR)
+        } else if ignores_polarity {
+            share_px(LEAST_BLUR, radius_px)
+        } else if radius_px >= SMALL_PX {
+            share_px(MOST_RIVALLED_BLUR, radius_px)
+        } else {
+            self.blur_px(MOST_RIVALLED_BLUR)
+        };
+        let sharp = !self.rivalled() || self.pose.sharpness_px() < most_px;
+        self.too_fast_for_edges() || self.edges_px() < self.blur_px(MOST_BLUR) && sharp
     }
 
     /// Whether so many events keep step as do at this speed, which was asked before, and no more is to be seen.
@@ -310,10 +320,10 @@ impl Measurement {
 
     // Not inlined: it is called in several places.
     #[inline(never)]
-    fn blur_px(&self, (share, px): (f32, f32)) -> f32 {
+    fn blur_px(&self, most: (f32, f32)) -> f32 {
         let radius_px = self.disc.radius_px;
         let jitter_px = 0.5 * radius_px * self.omega_rad_s.abs() * MOST_JITTER_S;
-        (share * radius_px).max(px) + BLUR_OF_JITTER * jitter_px
+        share_px(most, radius_px) + BLUR_OF_JITTER * jitter_px
     }
 
     /// Adds to the lock's error what may bias all its registrations alike.
@@ -372,6 +382,11 @@ impl Measurement {
         });
         even && !self.doubted() && (self.rates_alike(omega) || self.sharp())
     }
+}
+
+/// A share of the radius, but at least so many pixels.
+fn share_px((share, px): (f32, f32), radius_px: f32) -> f32 {
+    (share * radius_px).max(px)
 }
 
 /// Mean weighted by the inverse variances, of witnesses whose errors have something in common, and which may be so many standard
