@@ -236,7 +236,8 @@ pub struct Evidence {
     pub scan_rad_s: Option<f32>,
     /// Power of the scan's line over what unrelated events would give.
     pub scan_score: Option<f32>,
-    /// Share in step of the second best harmonic over that of the best: near 1 for flicker and vibration.
+    /// Share in step of the best rival of the best harmonic over that of the best, less what a rotor seen unevenly around must show: near 1
+    /// for vibration.
     pub scan_standing: Option<f32>,
     /// Share of the rotor's events that keep step with it, 0 to 1.
     pub coherence: Option<f32>,
@@ -284,6 +285,6 @@ pub struct Reading {
     pub lost: u64,
     /// The best status among the rotors, or why there is none.
     pub status: Status,
-    /// Rotors found, brightest heat first; refused ones included.
+    /// Rotors found, by their letters; refused ones included.
     pub rotors: Vec<RotorReading, MAX_ROTORS>,
 }

@@ -180,6 +180,7 @@ impl<'m> Tachometer<'m> {
         self.store.forget_roll();
         self.started = false;
         self.window_segments = 0;
+        self.satisfied = false;
         self.job = Job::Idle;
         self.candidates.clear();
         self.outcomes.clear();

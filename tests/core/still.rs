@@ -215,6 +215,26 @@ fn a_slow_rotor_after_a_still_scene_keeps_its_long_window() {
     }
 }
 
+/// The window before the gap was locked, and says nothing about what comes after.
+#[test]
+fn what_comes_after_a_gap_is_measured_at_the_end_of_the_stream() {
+    let scene = Scene {
+        rotors: vec![Rotor { rpm: 3000.0, radius_px: 40.0, ..Rotor::default() }],
+        ..Scene::default()
+    };
+    let mut events = Vec::new();
+    then(&mut events, &scene, 600.0);
+    let until = events.len();
+    let later_us = then(&mut events, &scene, 120.0) + 5_000_000;
+    events[until..].iter_mut().for_each(|event| event.t_us += 5_000_000);
+    for capacity in Capacity::ALL {
+        let readings = read(&events, capacity, 500, u32::MAX);
+        assert!(readings.iter().any(|r| r.status == Status::Locked && r.t_us < later_us));
+        let after = readings.iter().find(|reading| reading.t_us > later_us);
+        assert!(after.is_some_and(has_speed), "{capacity:?}: {:?}", windows(&readings));
+    }
+}
+
 /// A PC searches the whole image every so often, the device a part of it in every so many readings: either way it follows a rotor
 /// that is locked instead of measuring it afresh, which takes a PC twenty times as long.
 #[test]

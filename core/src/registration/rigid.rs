@@ -23,12 +23,6 @@ impl Rigid {
         Self { rotation: Matrix2::new(cos, -sin, sin, cos), shift_px: Vector2::zeros() }
     }
 
-    /// Yaw angle in radians, -pi to pi: atan2(R10, R00).
-    #[must_use]
-    pub fn yaw_rad(&self) -> f32 {
-        atan2(self.rotation.m21, self.rotation.m11)
-    }
-
     /// Where a point goes.
     #[must_use]
     pub fn apply(&self, x_px: f32, y_px: f32) -> (f32, f32) {
@@ -159,7 +153,8 @@ mod tests {
         for _ in 0..20 {
             rigid = rigid.then(0.1, (0.0, 0.0));
         }
-        assert!((rigid.yaw_rad() - 2.0).abs() < 1e-5);
+        let (x_px, y_px) = rigid.apply(1.0, 0.0);
+        assert!((x_px - 2.0_f32.cos()).abs() < 1e-5 && (y_px - 2.0_f32.sin()).abs() < 1e-5);
     }
 
     #[test]

@@ -67,10 +67,9 @@ pub struct Found {
     pub disc: Disc,
     /// Speed in rad/s, positive = clockwise on the screen; good to the resolution of the spectrum.
     pub omega_rad_s: f32,
-    /// Angular harmonic of the line it was found by: a multiple of the blade count, or less with an odd blade.
+    /// Angular harmonic that its measurement begins with: of the line it was found by, a multiple of the blade count or less with an
+    /// odd blade; or the one that it was last followed in.
     pub windings: u32,
-    /// Frequency of that line in Hz.
-    pub line_hz: f32,
     /// Whether it was found, and is measured, without regard to polarity.
     pub ignores_polarity: bool,
     /// Whether polarities were the other way round in parts of it, once it was measured.
@@ -85,8 +84,8 @@ impl Found {
     /// As extraction found it, in view of polarity or without regard to it.
     #[must_use]
     pub fn new(candidate: &Candidate, ignores_polarity: bool) -> Self {
-        let Candidate { disc, omega_rad_s, windings, line_hz, .. } = *candidate;
-        Self { disc, omega_rad_s, windings, line_hz, ignores_polarity, ..Self::default() }
+        let Candidate { disc, omega_rad_s, windings, .. } = *candidate;
+        Self { disc, omega_rad_s, windings, ignores_polarity, ..Self::default() }
     }
 }
 

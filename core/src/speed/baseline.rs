@@ -234,8 +234,11 @@ impl Pairs {
 
     /// Factor on the standard error of the mean: Student's t, and pairs that share events.
     fn widening(&self) -> f32 {
-        let shared = sqrt((self.yaws.len() as f32 / self.independent).max(1.0));
-        shared * student_over_normal((self.independent as usize).saturating_sub(1))
+        // Pairs that did not register bear nothing out.
+        let registered = self.yaws.len() as f32;
+        let independent = self.independent.min(registered);
+        let shared = sqrt(registered / independent.max(1.0));
+        shared * student_over_normal((independent as usize).saturating_sub(1))
     }
 
     /// Speed from the mean of the yaws; its error from their scatter.
@@ -308,6 +311,19 @@ mod tests {
         assert!(before > 30.0 && (behind.independent - 6.4).abs() < 0.01, "{behind:?}");
         nowhere.settle(9.3 * period_us, window_us);
         assert!(nowhere.unsettled_us == 0.0 && nowhere.independent == before, "{nowhere:?}");
+    }
+
+    #[test]
+    fn pairs_that_did_not_register_bear_nothing_out() {
+        let mut pairs = pairs();
+        let independent = pairs.independent;
+        assert!(independent > 3.0, "{independent}");
+        for yaw in [-1e-3, 1e-3] {
+            pairs.yaws.push(yaw).ok();
+        }
+        // Two tell no more than two, however many were planned: one degree of freedom.
+        assert_eq!(pairs.widening(), student_over_normal(1));
+        assert!(pairs.widening() > 6.0);
     }
 
     #[test]

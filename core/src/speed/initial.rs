@@ -106,7 +106,7 @@ impl Ladder {
             count += 1;
             if count > range.start && thinning.keeps_next() {
                 let t_us = event.since(window.start_us);
-                slice.push(SlicePoint { x_px, y_px, tau_s: 0.0, on: event.is_on() }).ok();
+                slice.push(SlicePoint { x_px, y_px, tau_s: 0.0, on: window.is_on(*event) }).ok();
                 sum_us += t_us as f32;
                 from_us = from_us.or(Some(t_us));
                 to_us = t_us;

@@ -105,8 +105,7 @@ pub struct Measurement {
     sided: bool,
     tilt: Option<Tilt>,
     pose: Pose,
-    /// Frequency and angular harmonic of the line that the rotor was found by.
-    line_hz: f32,
+    /// Angular harmonic that the recovery is asked with.
     windings: u32,
     /// Share in step with that line without windings, and with as many the other way, over its own.
     other_windings: [f32; 2],
@@ -145,7 +144,6 @@ impl Measurement {
             pose: Pose::new(found.disc, found.omega_rad_s, 1, found.windings, 0),
             sided: found.sided,
             tilt: found.tilt,
-            line_hz: found.line_hz,
             windings: found.windings,
             other_windings: [0.0; 2],
             events: 0,
@@ -343,7 +341,6 @@ impl Measurement {
                 } else {
                     self.harmonic.max(self.pose.harmonic() / 4)
                 },
-                line_hz: self.line_hz,
                 sided: self.sided,
                 tilt: self.pose.tilt(),
                 drift_px_s: self.drift_px_s,

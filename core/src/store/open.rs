@@ -67,7 +67,9 @@ impl Store<'_> {
         mut kept: impl FnMut(PackedEvent, u8),
     ) {
         let slot = self.slot(self.closed);
-        let skip = self.segments[slot].skip;
+        let segment = &mut self.segments[slot];
+        segment.heaviest_log2 = segment.heaviest_log2.max(weight_log2);
+        let skip = segment.skip;
         // What is to be passed over, in these events, and what is left of it that is less than one stands for.
         let (mut next, mut rest) = ((skip >> weight_log2) as usize, skip);
         let mut count = 0;
@@ -99,7 +101,6 @@ impl Store<'_> {
             rest = (1 << step_log2) - 1;
         }
         let segment = &mut self.segments[slot];
-        segment.heaviest_log2 = segment.heaviest_log2.max(weight_log2);
         rest &= (1 << weight_log2) - 1;
         segment.skip = (next.saturating_sub(events.len()) as u32) << weight_log2 | rest;
         let arrived = (events.len() as u64) << weight_log2;

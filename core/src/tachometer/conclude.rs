@@ -111,11 +111,12 @@ impl Tachometer<'_> {
         let lost =
             account.lost as f32 > MOST_LOST * account.counted.saturating_add(account.lost) as f32;
         let has = |status: Status| rotors.iter().any(|rotor| rotor.status == status);
+        let told = rotors.iter().any(|rotor| rotor.speed.is_some());
         if account.counted == 0 {
             Status::Refused(Reason::NoEvents)
-        } else if account.counted < LEAST_EVENTS {
+        } else if account.counted < LEAST_EVENTS && !told {
             Status::Refused(Reason::TooFewEvents)
-        } else if lost && rotors.iter().all(|rotor| rotor.speed.is_none()) {
+        } else if lost && !told {
             Status::Refused(Reason::Saturated)
         } else if has(Status::Locked) {
             Status::Locked

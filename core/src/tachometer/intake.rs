@@ -155,13 +155,14 @@ impl Tachometer<'_> {
         self.ignored.overrun += self.store.restart(t_us, first_us);
         self.heat.clear();
         self.until_search = 0;
+        self.satisfied = false;
     }
 
     /// Forgets the window, but not when the whole image is to be searched: what is known of the rotors still holds.
     pub(super) fn begin_anew(&mut self, t_us: u64) {
-        let until_search = self.until_search;
+        let (until_search, satisfied) = (self.until_search, self.satisfied);
         self.restart(t_us);
-        self.until_search = until_search;
+        (self.until_search, self.satisfied) = (until_search, satisfied);
     }
 
     /// Closes segments until the open one holds `t_us`.

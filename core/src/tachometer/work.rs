@@ -34,7 +34,6 @@ impl Default for Work {
 /// Memory that is used by one job at a time. With a tag of its own, of which the first is zero, whatever the jobs keep: else
 /// [`Work::EMPTY`] may hold a bit, and flash a copy of it all.
 #[derive(Debug)]
-#[allow(clippy::large_enum_variant, reason = "the larger one is the point: both share its memory")]
 #[repr(C, u32)]
 #[expect(clippy::large_enum_variant, reason = "the larger one is the point: both share its memory")]
 pub(super) enum Scratch {

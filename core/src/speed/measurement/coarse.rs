@@ -99,7 +99,7 @@ impl Measurement {
         let scan = harmonics(angular);
         let standing = scan.second_share / scan.share.max(1e-3);
         let rival = scan.rival_share / scan.share.max(1e-3);
-        self.evidence.scan_rad_s = (scan.best != 0).then(|| self.line_hz * TAU / scan.best as f32);
+        self.evidence.scan_rad_s = (scan.best != 0).then(|| line_hz * TAU / scan.best as f32);
         self.evidence.scan_score = Some(scan.share * scan.share * polar.len() as f32);
         self.evidence.scan_standing = Some(rival);
         if scan.best == 0 {
