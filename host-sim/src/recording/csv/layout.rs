@@ -5,6 +5,9 @@ use evtach_core::Geometry;
 use crate::recording::error::{Place, RecordingError};
 use crate::recording::geometry;
 
+/// In microseconds this is beyond the year 5000; in nanoseconds since 1970 it is 1973.
+const LEAST_NANOSECONDS: f64 = 1e17;
+
 /// Unit of the time column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
@@ -25,14 +28,20 @@ impl Unit {
         }
     }
 
-    /// Seconds are told by fractions finer than a millisecond between events closer than one second.
+    /// Seconds are told by fractions finer than a millisecond between events closer than one second, nanoseconds since 1970 by their size.
     pub fn from_times(times: &[f64]) -> Self {
         let fractional = times.iter().any(|t| (t * 1e3).fract() != 0.0 && t.fract() != 0.0);
         let step = match (times.first(), times.last()) {
             (Some(first), Some(last)) => (last - first).abs() / times.len() as f64,
             _ => 0.0,
         };
-        if fractional && step < 1.0 { Self::Seconds } else { Self::Microseconds }
+        if fractional && step < 1.0 {
+            Self::Seconds
+        } else if times.iter().all(|t| *t >= LEAST_NANOSECONDS) && !times.is_empty() {
+            Self::Nanoseconds
+        } else {
+            Self::Microseconds
+        }
     }
 
     /// Word for people.
@@ -134,7 +143,11 @@ pub fn find(head: &str) -> Result<Layout, RecordingError> {
         ));
     }
     layout.unit = told_unit.unwrap_or_else(|| Unit::from_times(&column(&rows, layout.columns[0])));
-    let how = if told_unit.is_some() { "as its column says" } else { "from the first rows" };
+    let how = if told_unit.is_some() {
+        "as its column says"
+    } else {
+        "from the first rows; a first line of names such as t_ms,x,y,p says otherwise"
+    };
     layout.assumed.push(format!("time in {}, {how}", layout.unit.name()));
     Ok(layout)
 }
@@ -291,6 +304,14 @@ mod tests {
         );
         assert_eq!(columns("5,6,1000,1\n3,4,1001,-1\n"), ([2, 0, 1, 3], Unit::Microseconds));
         assert_eq!(columns("0.003811 96 133 0\n0.003820 11 22 1\n"), ([0, 1, 2, 3], Unit::Seconds));
+    }
+
+    #[test]
+    fn nanoseconds_since_1970_are_told_by_their_size() {
+        let head = "1700000000000001000,5,6,1\n1700000000000003000,3,4,0\n";
+        assert_eq!(columns(head), ([0, 1, 2, 3], Unit::Nanoseconds));
+        let head = "1700000000000001,5,6,1\n1700000000000003,3,4,0\n";
+        assert_eq!(columns(head), ([0, 1, 2, 3], Unit::Microseconds));
     }
 
     #[test]
