@@ -16,7 +16,8 @@ const LEAST_COHERENCE: f32 = 0.2;
 /// One of fewer than so many times that is faint: unless it is read, nothing says that it turns.
 const FAINT: f32 = 1.5;
 /// Blur of the rotor's edges, as a share of its radius and in pixels for a small one, beyond which they are no edges;
-/// and within which they are so sharp that a registration that went astray does not count against them.
+/// and within which they are so sharp that a registration that went astray does not count against them, nor a doubtful harmonic
+/// without polarity.
 const MOST_BLUR: (f32, f32) = (0.1, 1.5);
 const LEAST_BLUR: (f32, f32) = (0.06, 1.3);
 /// Blur, noise and all, beyond which they are none where another harmonic keeps step.
