@@ -13,6 +13,8 @@ target=thumbv7em-none-eabihf
 # A red run must be red again when it is repeated. `cargo test` by hand draws new cases each time, and so does
 # fuzz/run.sh.
 export PROPTEST_RNG_SEED=${PROPTEST_RNG_SEED:-20260101}
+# What is built only once keeps nothing for the next time.
+[ -z "${CI:-}" ] || export CARGO_INCREMENTAL=0
 
 as_root() {
   if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi
@@ -90,7 +92,7 @@ step_docs() {
 
 # The limits on the core's state and store are assertions in the firmware: past them it does not build.
 step_image() {
-  cargo build --release -p evtach-core --target "$target"
+  cargo build --profile firmware -p evtach-core --target "$target"
   cargo fw-qemu
   cargo fw
 }
