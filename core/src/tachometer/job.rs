@@ -152,8 +152,6 @@ impl Tachometer<'_> {
                 }
                 let (index, mut outcome) = (*index, measurement.result());
                 outcome.found.ignores_polarity = window.ignores_polarity;
-                // Leading and trailing edges of blades as wide as the gaps cancel there, more in some blocks than in others.
-                outcome.lapsed &= !window.ignores_polarity;
                 if candidate.followed.is_some() && outcome.status != Status::Locked {
                     // The others are followed all the same.
                     self.lost = true;

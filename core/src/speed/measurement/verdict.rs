@@ -279,7 +279,8 @@ impl Measurement {
 
     /// Whether the rotor has edges: what merely keeps step with one frequency has none, and a wrong harmonic about a wrong
     /// centre has no overtone. It blurs them, too: where another harmonic keeps step at all, noise is no excuse, nor is jitter where that of
-    /// a rotor that is not small is in doubt. Without polarity leading edges are matched with trailing ones, so that only sharp ones tell.
+    /// a rotor that is not small is in doubt. Without polarity leading edges are matched with trailing ones, and what could not be
+    /// counted may be a winding more than there are blades: only sharp ones tell.
     pub(super) fn has_edges(&self, ignores_polarity: bool) -> bool {
         if self.in_doubt() {
             return false;
@@ -287,7 +288,7 @@ impl Measurement {
         let radius_px = self.disc.radius_px;
         let most_px = if !self.doubted() {
             self.blur_px(MOST_RIVALLED_BLUR)
-        } else if ignores_polarity {
+        } else if ignores_polarity || self.parts.is_none() {
             share_px(LEAST_BLUR, radius_px)
         } else if radius_px >= SMALL_PX {
             share_px(MOST_RIVALLED_BLUR, radius_px)

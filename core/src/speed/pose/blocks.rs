@@ -160,29 +160,26 @@ impl Block {
 
 /// Blocks one behind another that chance leaves out of step: in random scenes of steady rotors.
 const LEAST_LAPSE: usize = 2;
-/// Share of the events in step over so many blocks, over that below which one is not believed, from which down there is no rotor in them:
-/// in random scenes of steady rotors it is 0.8 and more.
+/// Mean share in step of so many blocks, over that below which one is not believed, from which down there is no rotor in them.
 const DEEP: f32 = 0.6;
 /// A lapse so deep lasts for a symmetry period, and for this part of the window.
 const DEEP_ONE_OF: usize = 8;
 
 /// Whether the rotor was out of step for longer than a symmetry period of so many blocks and than chance makes, as it stood still meanwhile or
-/// turned with another speed: blocks one behind another with less than a share in step, or some that hold no rotor together where each
-/// may be in step by chance.
+/// turned with another speed: blocks one behind another with less than a share in step, or some that hold no rotor on average where each
+/// may be in step by chance. All blocks count alike, as they last alike: with the device's memory some have ten times the events of others.
 pub fn lapsed(blocks: &[Block], least: f32, in_period: usize) -> bool {
     let together = in_period.max(blocks.len() / DEEP_ONE_OF).max(LEAST_LAPSE);
     let (mut run, mut longest, mut deep) = (0, 0, false);
-    let (mut in_step, mut count) = (0.0, 0.0);
+    let mut shares = 0.0;
     for (index, block) in blocks.iter().enumerate() {
         run = if block.share() < least { run + 1 } else { 0 };
         longest = longest.max(run);
-        in_step += block.in_step;
-        count += block.count;
+        shares += block.share();
         if let Some(gone) = index.checked_sub(together).and_then(|gone| blocks.get(gone)) {
-            in_step -= gone.in_step;
-            count -= gone.count;
+            shares -= gone.share();
         }
-        deep |= index + 1 >= together && in_step < DEEP * least * count;
+        deep |= index + 1 >= together && shares < DEEP * least * together as f32;
     }
     deep || longest > in_period.max(LEAST_LAPSE)
 }
