@@ -10,7 +10,7 @@ use evtach_host::recording::{self, OpenOptions, Recording, RecordingError};
 pub fn read_behind(prefix: &[u8], data: &[u8]) {
     for geometry in [None, Geometry::new(640, 480)] {
         let bytes = [prefix, data].concat();
-        drain(recording::open_reader(Box::new(Cursor::new(bytes)), &OpenOptions { geometry }));
+        drain(recording::open_reader(Box::new(Cursor::new(bytes)), &OpenOptions { geometry, ..OpenOptions::default() }));
     }
 }
 

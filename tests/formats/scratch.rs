@@ -49,7 +49,7 @@ pub struct Read {
 
 /// Reads a recording to its end.
 pub fn read(path: &Path, geometry: Option<Geometry>) -> Result<Read, RecordingError> {
-    let mut recording = recording::open(path, &OpenOptions { geometry })?;
+    let mut recording = recording::open(path, &OpenOptions { geometry, ..OpenOptions::default() })?;
     let mut events = Vec::new();
     let error = loop {
         match recording.read_chunk(&mut events) {

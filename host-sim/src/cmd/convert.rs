@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, bail};
-use evtach_core::{Event, Geometry, Roi};
+use evtach_core::{Event, Roi};
 use evtach_host::recording::write::{self, WriteFormat};
-use evtach_host::recording::{self, ImuSample, OpenOptions};
+use evtach_host::recording::{self, ImuSample};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::how::parse_roi;
 use super::keep_apart;
+use super::stated::Stated;
 use super::wait::LONGEST_US;
 
 /// Arguments of `evtach convert`.
@@ -23,9 +24,8 @@ pub struct Args {
     /// Format to write, whatever the extension: evt2, evt3, dat, aedat4, csv, npy, es, spi, ev8.
     #[arg(long, value_name = "FORMAT")]
     to: Option<WriteFormat>,
-    /// Size of the sensor, where the recording does not say it or says it wrong.
-    #[arg(long, value_name = "WxH", value_parser = recording::parse_geometry)]
-    geometry: Option<Geometry>,
+    #[command(flatten)]
+    stated: Stated,
     /// Keep only the events in this rectangle of pixels; places stay as they are.
     #[arg(long, value_name = "X,Y,W,H", value_parser = parse_roi)]
     roi: Option<Roi>,
@@ -53,7 +53,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     keep_apart(&args.input, &args.output)?;
     let name = args.input.display().to_string();
-    let options = OpenOptions { geometry: args.geometry };
+    let options = args.stated.into();
     let mut recording = recording::open(&args.input, &options).with_context(|| name.clone())?;
     for sentence in &recording.assumed {
         eprintln!("assumed: {sentence}");

@@ -5,7 +5,9 @@ use std::path::Path;
 use anyhow::Context;
 use evtach_core::{Geometry, GyroSample, Roi, Settings};
 use evtach_host::measure::Capacity;
-use evtach_host::recording::{self, ImuSample, OpenOptions, Recording};
+use evtach_host::recording::{self, ImuSample, Recording};
+
+use super::stated::Stated;
 
 /// What is known better than the tachometer finds it, and the memory it is given.
 #[derive(clap::Args)]
@@ -19,9 +21,8 @@ pub struct How {
     /// Fixed window instead of one that adapts to the rotor.
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(5..=2000))]
     window_ms: Option<u32>,
-    /// Size of the sensor, where the recording does not say it or says it wrong.
-    #[arg(long, value_name = "WxH", value_parser = recording::parse_geometry)]
-    geometry: Option<Geometry>,
+    #[command(flatten)]
+    stated: Stated,
     /// Memory of the tachometer: "device" gives what the device shows, to the bit.
     #[arg(long, value_enum, default_value = "full")]
     pub capacity: Capacity,
@@ -44,7 +45,7 @@ impl How {
     /// Opens a recording and says on stderr what was assumed about it.
     pub fn open(&self, file: &Path) -> anyhow::Result<Recording> {
         let name = file.display().to_string();
-        let options = OpenOptions { geometry: self.geometry };
+        let options = self.stated.into();
         let recording = recording::open(file, &options).with_context(|| name.clone())?;
         for assumed in &recording.assumed {
             eprintln!("{name}: {assumed}");

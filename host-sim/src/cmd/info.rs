@@ -8,10 +8,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Context;
-use evtach_core::{Event, Geometry};
-use evtach_host::recording::{self, ImuSample, OpenOptions, Recording};
+use evtach_core::Event;
+use evtach_host::recording::{self, ImuSample, Recording};
 
 use super::say;
+use super::stated::Stated;
 use statistics::{Count, Statistics, Timeline};
 
 /// Arguments of `evtach info`.
@@ -20,9 +21,8 @@ pub struct Args {
     /// Recordings; "-" reads stdin.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Size of the sensor, where the recording does not say it or says it wrong.
-    #[arg(long, value_name = "WxH", value_parser = recording::parse_geometry)]
-    geometry: Option<Geometry>,
+    #[command(flatten)]
+    stated: Stated,
 }
 
 /// Columns of the picture of the rate over time.
@@ -40,7 +40,7 @@ const TOGETHER: f64 = 0.47;
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     for (index, file) in args.files.iter().enumerate() {
         let name = file.display().to_string();
-        let options = OpenOptions { geometry: args.geometry };
+        let options = args.stated.into();
         let mut recording = recording::open(file, &options).with_context(|| name.clone())?;
         let mut statistics = Statistics::new(recording.geometry);
         let mut imu = Vec::new();

@@ -13,6 +13,7 @@ pub mod info;
 pub mod measure;
 pub mod plot;
 pub mod screen;
+mod stated;
 pub mod synth;
 mod wait;
 pub mod watch;

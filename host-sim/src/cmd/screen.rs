@@ -4,13 +4,13 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Context as _;
-use evtach_core::Geometry;
 use evtach_firmware::instrument::{Action, Instrument, Mode, Page, Preferences, Unit};
 use evtach_firmware::ui::Screen;
 use evtach_host::frame::Frame;
 use evtach_host::play::play;
-use evtach_host::recording::{self, OpenOptions};
+use evtach_host::recording;
 
+use super::stated::Stated;
 use super::{in_order, keep_apart, say};
 
 /// Arguments of `evtach screen`.
@@ -35,9 +35,8 @@ pub struct Args {
     /// Blade count, when it is known.
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=32))]
     blades: Option<u8>,
-    /// Size of the sensor, where the recording does not say it or says it wrong.
-    #[arg(long, value_name = "WxH", value_parser = recording::parse_geometry)]
-    geometry: Option<Geometry>,
+    #[command(flatten)]
+    stated: Stated,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -97,8 +96,8 @@ impl Args {
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     keep_apart(&args.file, &args.out)?;
     let name = args.file.display().to_string();
-    let mut recording = recording::open(&args.file, &OpenOptions { geometry: args.geometry })
-        .with_context(|| name.clone())?;
+    let mut recording =
+        recording::open(&args.file, &args.stated.into()).with_context(|| name.clone())?;
     for assumed in &recording.assumed {
         eprintln!("{name}: {assumed}");
     }

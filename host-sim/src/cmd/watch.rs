@@ -9,11 +9,12 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, bail};
-use evtach_core::Geometry;
-use evtach_host::recording::{self, OpenOptions};
+use evtach_host::recording;
 use evtach_host::watch::{Monitor, Source, draw, file, port};
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
+
+use super::stated::Stated;
 
 /// How often the view is drawn.
 const FRAME: Duration = Duration::from_millis(100);
@@ -30,9 +31,8 @@ pub struct Args {
     /// Speed of the serial port in bits a second; ports over USB ignore it.
     #[arg(long, default_value_t = 115_200)]
     baud: u32,
-    /// Size of the sensor, where the recording does not say it or says it wrong.
-    #[arg(long, value_name = "WxH", value_parser = recording::parse_geometry)]
-    geometry: Option<Geometry>,
+    #[command(flatten)]
+    stated: Stated,
 }
 
 fn parse_speed(text: &str) -> Result<f64, String> {
@@ -51,7 +51,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let source = if is_port(&args.from) {
         port(&args.from, args.baud)?
     } else {
-        let options = OpenOptions { geometry: args.geometry };
+        let options = args.stated.into();
         file(recording::open(&args.from, &options).with_context(|| name.clone())?, args.speed)
     };
     let mut monitor = Monitor::new(name);

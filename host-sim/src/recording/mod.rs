@@ -18,6 +18,7 @@ mod prophesee_header;
 mod raw;
 mod ros2;
 mod spi;
+mod time_unit;
 pub mod write;
 
 use evtach_core::decode::Counts;
@@ -27,6 +28,7 @@ pub use error::{Place, RecordingError};
 pub use imu::ImuSample;
 use open::Progress;
 pub use open::{open, open_reader};
+pub use time_unit::TimeUnit;
 
 /// Parses a sensor size such as "640x480".
 ///
@@ -46,6 +48,8 @@ pub fn parse_geometry(text: &str) -> Result<Geometry, String> {
 pub struct OpenOptions {
     /// Size of the sensor; overrides what the file says.
     pub geometry: Option<Geometry>,
+    /// Unit of the times in a text or NumPy recording; overrides what the file says. Others are refused with it.
+    pub time_unit: Option<TimeUnit>,
 }
 
 /// What a format's reader knows after its header.

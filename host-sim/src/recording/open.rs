@@ -13,8 +13,8 @@ use super::error::RecordingError;
 use super::input::Input;
 use super::prophesee_header::Header;
 use super::{
-    OpenOptions, Opened, Recording, Side, aedat2, aedat3, aedat4, csv, dat, es, ev8, geometry, npy,
-    raw, ros2, spi,
+    OpenOptions, Opened, Recording, Side, TimeUnit, aedat2, aedat3, aedat4, csv, dat, es, ev8,
+    geometry, npy, raw, ros2, spi,
 };
 
 /// Bytes looked at to tell text from binary.
@@ -26,9 +26,12 @@ const SNIFF_BYTES: usize = 4096;
 /// When the file cannot be read, is no known recording, or its sensor size is neither told nor inferable.
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Recording, RecordingError> {
     let progress = Progress::default();
-    let mut opened = sniff(input(path, &progress)?, path, options.geometry, true)?;
+    let mut opened = recognise(input(path, &progress)?, path, options)?;
     let geometry = if let Some(geometry) = options.geometry {
-        opened.assumed = vec![format!("{} as given by --geometry", geometry::show(geometry))];
+        if let Some(told) = opened.geometry.map(geometry::show) {
+            opened.assumed.retain(|sentence| !sentence.starts_with(&told));
+        }
+        opened.assumed.push(format!("{} as given by --geometry", geometry::show(geometry)));
         geometry
     } else if let Some(geometry) = opened.geometry {
         geometry
@@ -37,7 +40,8 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Recording, RecordingEr
             return Err(RecordingError::NoGeometry { format: opened.format });
         }
         let (geometry, sentence) = scan(&mut opened)?;
-        opened = sniff(input(path, &progress)?, path, Some(geometry), true)?;
+        let options = OpenOptions { geometry: Some(geometry), ..*options };
+        opened = recognise(input(path, &progress)?, path, &options)?;
         opened.assumed.push(sentence);
         geometry
     };
@@ -56,7 +60,7 @@ pub fn open_reader(
     let progress = Progress::default();
     let read = Arc::clone(&progress.read);
     let input = Input::new(Box::new(Counted { reader, read }));
-    let opened = sniff(input, Path::new("-"), options.geometry, true)?;
+    let opened = recognise(input, Path::new("-"), options)?;
     let told = options.geometry.or(opened.geometry);
     let geometry = told.ok_or(RecordingError::NoGeometry { format: opened.format })?;
     Ok(Recording::new(opened, geometry, progress))
@@ -134,21 +138,37 @@ fn scan(opened: &mut Opened) -> Result<(Geometry, String), RecordingError> {
     Ok((geometry, sentence))
 }
 
+/// Formats whose times are bare numbers.
+const WITHOUT_UNIT: [&str; 3] = ["CSV", "NPY", "NPZ"];
+
+/// Recognises the format, and refuses what is stated in vain.
+fn recognise(input: Input, path: &Path, options: &OpenOptions) -> Result<Opened, RecordingError> {
+    let opened = sniff(input, path, options, true)?;
+    if options.time_unit.is_some() && !WITHOUT_UNIT.contains(&opened.format) {
+        return Err(RecordingError::Unsupported {
+            what: format!("the times of {} are in a unit of their own", opened.format),
+            advice: "leave out --time-unit".to_owned(),
+        });
+    }
+    Ok(opened)
+}
+
 /// Recognises the format by its first bytes. Some formats count rows or columns from the other end: they need the
-/// size to turn them round, `known` where the file does not tell it.
+/// size to turn them round, stated where the file does not tell it.
 fn sniff(
     mut input: Input,
     path: &Path,
-    known: Option<Geometry>,
+    options: &OpenOptions,
     unpack: bool,
 ) -> Result<Opened, RecordingError> {
+    let OpenOptions { geometry: known, time_unit } = *options;
     let head = input.peek(SNIFF_BYTES)?;
     if head.is_empty() {
         return Err(RecordingError::Empty);
     }
     if head.starts_with(&[0x1f, 0x8b]) && unpack {
         let mut opened =
-            sniff(Input::new(Box::new(MultiGzDecoder::new(input))), path, known, false)?;
+            sniff(Input::new(Box::new(MultiGzDecoder::new(input))), path, options, false)?;
         opened.about.push(("compression".to_owned(), "gzip".to_owned()));
         return Ok(opened);
     }
@@ -174,13 +194,13 @@ fn sniff(
         return ev8::open(input);
     }
     if head.starts_with(npy::MAGIC) {
-        return npy::open(input);
+        return npy::open(input, time_unit);
     }
     if head.starts_with(npy::ZIP_MAGIC) {
         return if path.as_os_str() == "-" || !unpack {
             Err(needs_file("an .npz archive"))
         } else {
-            npy::open_npz(path)
+            npy::open_npz(path, time_unit)
         };
     }
     if head.starts_with(ros2::MCAP_MAGIC) {
@@ -203,10 +223,10 @@ fn sniff(
         });
     }
     if head.starts_with(b"%") {
-        return prophesee(input);
+        return prophesee(input, time_unit);
     }
     if csv::is_text(head) {
-        return csv::open(input);
+        return csv::open(input, time_unit);
     }
     Err(RecordingError::Unknown {
         found: format!("binary data that begins with {:02x?}", &head[..head.len().min(8)]),
@@ -229,7 +249,7 @@ fn hdf5() -> RecordingError {
     }
 }
 
-fn prophesee(mut input: Input) -> Result<Opened, RecordingError> {
+fn prophesee(mut input: Input, time_unit: Option<TimeUnit>) -> Result<Opened, RecordingError> {
     let header = Header::peek(&mut input)?;
     if header.get("evt").is_some() || header.get("format").is_some() {
         return raw::open(input, header);
@@ -241,7 +261,7 @@ fn prophesee(mut input: Input) -> Result<Opened, RecordingError> {
         return Ok(dat::open(input, header));
     }
     if csv::is_text(data) {
-        return csv::open(input);
+        return csv::open(input, time_unit);
     }
     Err(RecordingError::Unknown {
         found: "a Prophesee header without an \"evt\" or \"format\" line".to_owned(),

@@ -109,6 +109,31 @@ fn no_geometry() {
     assert!(run.stderr.contains("--geometry"), "{}", run.stderr);
 }
 
+/// Times in milliseconds may look like microseconds: that is told, and what overrides it.
+#[test]
+fn a_unit_that_no_name_says() {
+    let folder = folder();
+    let path = folder.path().join("ms.csv").display().to_string();
+    let rows = rotor().into_iter().map(|e| {
+        format!("{}.{:03},{},{},{}\n", e.t_us / 1000, e.t_us % 1000, e.x, e.y, e.polarity as u8)
+    });
+    std::fs::write(&path, rows.collect::<String>()).expect("room on the disk");
+    let run = evtach(&["measure", "--geometry", "200x160", &path], b"");
+    let guess = "time in microseconds, from the first events; --time-unit overrides";
+    assert!(run.stderr.contains(guess), "{}", run.stderr);
+    // A thousand times as fast as it turns: no rotor does.
+    assert_eq!(run.code, Some(1), "{}", run.stdout);
+    let run = evtach(&["measure", "--geometry", "200x160", "--time-unit", "ms", &path], b"");
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert!(run.stderr.contains("time in milliseconds, as given by --time-unit"), "{}", run.stderr);
+    assert!(run.stderr.contains("200x160 as given by --geometry"), "{}", run.stderr);
+    assert_reads_the_rotor(&run.stdout);
+    // What says its unit itself is not read in another.
+    let raw = write(&folder, "rotor.raw", &rotor()).display().to_string();
+    let run = evtach(&["measure", "--time-unit", "ms", &raw], b"");
+    assert_refused_as_bad(&run, "leave out --time-unit");
+}
+
 /// From a pipe it cannot be inferred: reading twice is not possible.
 #[test]
 fn no_geometry_from_a_pipe() {

@@ -53,7 +53,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         args.files.clone()
     };
     // Text and arrays do not tell the size; faery does not look for it either.
-    let options = OpenOptions { geometry: args.files.is_empty().then_some(MADE_UP) };
+    let options = OpenOptions {
+        geometry: args.files.is_empty().then_some(MADE_UP),
+        ..OpenOptions::default()
+    };
     let rows: anyhow::Result<Vec<Row>> =
         files.iter().map(|file| row(file, &options, &args.python)).collect();
     if args.files.is_empty() {

@@ -2,65 +2,16 @@
 
 use evtach_core::Geometry;
 
+use crate::recording::TimeUnit;
 use crate::recording::error::{Place, RecordingError};
 use crate::recording::geometry;
-
-/// In microseconds this is beyond the year 5000; in nanoseconds since 1970 it is 1973.
-const LEAST_NANOSECONDS: f64 = 1e17;
-
-/// Unit of the time column.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Unit {
-    Seconds,
-    Milliseconds,
-    Microseconds,
-    Nanoseconds,
-}
-
-impl Unit {
-    /// Power of ten from this unit to microseconds.
-    pub const fn exponent(self) -> i32 {
-        match self {
-            Self::Seconds => 6,
-            Self::Milliseconds => 3,
-            Self::Microseconds => 0,
-            Self::Nanoseconds => -3,
-        }
-    }
-
-    /// Seconds are told by fractions finer than a millisecond between events closer than one second, nanoseconds since 1970 by their size.
-    pub fn from_times(times: &[f64]) -> Self {
-        let fractional = times.iter().any(|t| (t * 1e3).fract() != 0.0 && t.fract() != 0.0);
-        let step = match (times.first(), times.last()) {
-            (Some(first), Some(last)) => (last - first).abs() / times.len() as f64,
-            _ => 0.0,
-        };
-        if fractional && step < 1.0 {
-            Self::Seconds
-        } else if times.iter().all(|t| *t >= LEAST_NANOSECONDS) && !times.is_empty() {
-            Self::Nanoseconds
-        } else {
-            Self::Microseconds
-        }
-    }
-
-    /// Word for people.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Seconds => "seconds",
-            Self::Milliseconds => "milliseconds",
-            Self::Microseconds => "microseconds",
-            Self::Nanoseconds => "nanoseconds",
-        }
-    }
-}
 
 /// Layout of a text recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
     /// Columns of t, x, y and polarity, counted from 0.
     pub columns: [usize; 4],
-    pub unit: Unit,
+    pub unit: TimeUnit,
     pub geometry: Option<Geometry>,
     /// Lines before the first event.
     pub skip_lines: u64,
@@ -78,12 +29,12 @@ pub fn fields(line: &str) -> impl Iterator<Item = &str> {
     line.split(|c: char| u8::try_from(c).is_ok_and(separates)).filter(|field| !field.is_empty())
 }
 
-/// Finds the layout from the first lines of a file.
-pub fn find(head: &str) -> Result<Layout, RecordingError> {
-    let mut names: Option<Vec<(usize, Option<Unit>)>> = None;
+/// Finds the layout from the first lines of a file; the unit of its times may be stated.
+pub fn find(head: &str, stated_unit: Option<TimeUnit>) -> Result<Layout, RecordingError> {
+    let mut names: Option<Vec<(usize, Option<TimeUnit>)>> = None;
     let mut layout = Layout {
         columns: [0, 1, 2, 3],
-        unit: Unit::Microseconds,
+        unit: TimeUnit::Microseconds,
         geometry: None,
         skip_lines: 0,
         assumed: Vec::new(),
@@ -142,13 +93,10 @@ pub fn find(head: &str) -> Result<Layout, RecordingError> {
             if vendor_order { " (as %geometry files have them)" } else { " from the first rows" }
         ));
     }
-    layout.unit = told_unit.unwrap_or_else(|| Unit::from_times(&column(&rows, layout.columns[0])));
-    let how = if told_unit.is_some() {
-        "as its column says"
-    } else {
-        "from the first rows; a first line of names such as t_ms,x,y,p says otherwise"
-    };
-    layout.assumed.push(format!("time in {}, {how}", layout.unit.name()));
+    let seen = TimeUnit::from_times(&column(&rows, layout.columns[0]));
+    let (unit, sentence) = TimeUnit::settle(stated_unit, told_unit, "column", seen);
+    layout.unit = unit;
+    layout.assumed.push(sentence);
     Ok(layout)
 }
 
@@ -167,14 +115,14 @@ fn order(columns: [usize; 4]) -> String {
 }
 
 /// Splits "timestamp [us]" or "t_us" into name and unit.
-pub fn unit_of_name(name: &str) -> (String, Option<Unit>) {
+pub fn unit_of_name(name: &str) -> (String, Option<TimeUnit>) {
     // faery writes the size into the names: "x@640".
     let (stem, suffix) = name.split_once(['_', '[', '(', ' ', '@']).unwrap_or((name, ""));
     let unit = match suffix.trim_matches(|c: char| !c.is_ascii_alphabetic()) {
-        "s" | "sec" | "seconds" => Some(Unit::Seconds),
-        "ms" | "milliseconds" => Some(Unit::Milliseconds),
-        "us" | "micros" | "microseconds" => Some(Unit::Microseconds),
-        "ns" | "nanoseconds" => Some(Unit::Nanoseconds),
+        "s" | "sec" | "seconds" => Some(TimeUnit::Seconds),
+        "ms" | "milliseconds" => Some(TimeUnit::Milliseconds),
+        "us" | "micros" | "microseconds" => Some(TimeUnit::Microseconds),
+        "ns" | "nanoseconds" => Some(TimeUnit::Nanoseconds),
         _ => None,
     };
     (stem.trim().to_owned(), unit)
@@ -213,7 +161,7 @@ pub fn names_columns(line: &[u8]) -> bool {
 }
 
 /// Columns t, x, y, p with the unit their name tells, or `None` when the line does not name all four.
-fn columns_from_names(line: &str) -> Option<Vec<(usize, Option<Unit>)>> {
+fn columns_from_names(line: &str) -> Option<Vec<(usize, Option<TimeUnit>)>> {
     let names: Vec<String> = line
         .split([',', ';', '\t'])
         .flat_map(|part| {
@@ -274,8 +222,8 @@ fn columns_from_rows(rows: &[Vec<&str>]) -> [usize; 4] {
 mod tests {
     use super::*;
 
-    fn columns(head: &str) -> ([usize; 4], Unit) {
-        let layout = find(head).unwrap();
+    fn columns(head: &str) -> ([usize; 4], TimeUnit) {
+        let layout = find(head, None).unwrap();
         (layout.columns, layout.unit)
     }
 
@@ -283,54 +231,57 @@ mod tests {
     fn header_names_map_the_columns() {
         assert_eq!(
             columns("x,y,polarity,timestamp\n1,2,0,5\n"),
-            ([3, 0, 1, 2], Unit::Microseconds)
+            ([3, 0, 1, 2], TimeUnit::Microseconds)
         );
-        assert_eq!(columns("t,x,y,on\n5,1,2,1\n"), ([0, 1, 2, 3], Unit::Microseconds));
+        assert_eq!(columns("t,x,y,on\n5,1,2,1\n"), ([0, 1, 2, 3], TimeUnit::Microseconds));
         assert_eq!(
             columns("# timestamp [ns], x, y, p\n5000,1,2,1\n"),
-            ([0, 1, 2, 3], Unit::Nanoseconds)
+            ([0, 1, 2, 3], TimeUnit::Nanoseconds)
         );
-        let faery = find("t,x@320,y@240,on\n5,1,2,1\n").unwrap();
+        let faery = find("t,x@320,y@240,on\n5,1,2,1\n", None).unwrap();
         assert_eq!((faery.columns, faery.geometry), ([0, 1, 2, 3], Geometry::new(320, 240)));
-        assert_eq!(columns("t_s x y p\n0.5 1 2 1\n"), ([0, 1, 2, 3], Unit::Seconds));
+        assert_eq!(columns("t_s x y p\n0.5 1 2 1\n"), ([0, 1, 2, 3], TimeUnit::Seconds));
     }
 
     #[test]
     fn first_rows_show_the_order() {
-        assert_eq!(columns("10,5,6,1\n12,3,4,0\n"), ([0, 1, 2, 3], Unit::Microseconds));
+        assert_eq!(columns("10,5,6,1\n12,3,4,0\n"), ([0, 1, 2, 3], TimeUnit::Microseconds));
         assert_eq!(
             columns("5,6,1,1000\n3,4,0,1001\n9,1,0,1002\n"),
-            ([3, 0, 1, 2], Unit::Microseconds)
+            ([3, 0, 1, 2], TimeUnit::Microseconds)
         );
-        assert_eq!(columns("5,6,1000,1\n3,4,1001,-1\n"), ([2, 0, 1, 3], Unit::Microseconds));
-        assert_eq!(columns("0.003811 96 133 0\n0.003820 11 22 1\n"), ([0, 1, 2, 3], Unit::Seconds));
+        assert_eq!(columns("5,6,1000,1\n3,4,1001,-1\n"), ([2, 0, 1, 3], TimeUnit::Microseconds));
+        assert_eq!(
+            columns("0.003811 96 133 0\n0.003820 11 22 1\n"),
+            ([0, 1, 2, 3], TimeUnit::Seconds)
+        );
     }
 
     #[test]
     fn nanoseconds_since_1970_are_told_by_their_size() {
         let head = "1700000000000001000,5,6,1\n1700000000000003000,3,4,0\n";
-        assert_eq!(columns(head), ([0, 1, 2, 3], Unit::Nanoseconds));
+        assert_eq!(columns(head), ([0, 1, 2, 3], TimeUnit::Nanoseconds));
         let head = "1700000000000001,5,6,1\n1700000000000003,3,4,0\n";
-        assert_eq!(columns(head), ([0, 1, 2, 3], Unit::Microseconds));
+        assert_eq!(columns(head), ([0, 1, 2, 3], TimeUnit::Microseconds));
     }
 
     #[test]
     fn rpg_size_line_and_vendor_geometry_line() {
-        let layout = find("240 180\n0.003811 96 133 0\n0.003820 11 22 1\n").unwrap();
-        assert_eq!((layout.geometry, layout.unit), (Geometry::new(240, 180), Unit::Seconds));
-        let layout = find("%geometry:640,480\n0,0,1,7\n1,0,1,8\n").unwrap();
+        let layout = find("240 180\n0.003811 96 133 0\n0.003820 11 22 1\n", None).unwrap();
+        assert_eq!((layout.geometry, layout.unit), (Geometry::new(240, 180), TimeUnit::Seconds));
+        let layout = find("%geometry:640,480\n0,0,1,7\n1,0,1,8\n", None).unwrap();
         assert_eq!((layout.geometry, layout.columns), (Geometry::new(640, 480), [3, 0, 1, 2]));
     }
 
     #[test]
     fn prose_is_refused() {
-        assert!(find("Dear reader,\nthis is a letter\n").is_err());
-        assert!(find("1\n2\n3\n").is_err());
+        assert!(find("Dear reader,\nthis is a letter\n", None).is_err());
+        assert!(find("1\n2\n3\n", None).is_err());
     }
 
     #[test]
     fn floats_that_are_whole_are_microseconds() {
         let head = "1.304e+06 1.0e+00 2.0e+00 1.0e+00\n1.305e+06 3.0e+00 2.0e+00 0.0e+00\n";
-        assert_eq!(columns(head), ([0, 1, 2, 3], Unit::Microseconds));
+        assert_eq!(columns(head), ([0, 1, 2, 3], TimeUnit::Microseconds));
     }
 }

@@ -4,6 +4,6 @@ mod layout;
 mod read;
 mod write;
 
-pub(crate) use layout::{Unit, order_from_numbers, unit_of_name};
+pub(crate) use layout::{order_from_numbers, unit_of_name};
 pub(crate) use read::{is_text, open};
 pub(crate) use write::CsvWriter;

@@ -5,7 +5,7 @@ use evtach_core::{Event, Polarity};
 use super::layout::{self, Layout};
 use crate::recording::error::{Place, RecordingError};
 use crate::recording::input::Input;
-use crate::recording::{Opened, Side, Source};
+use crate::recording::{Opened, Side, Source, TimeUnit};
 
 /// Bytes looked at to find the layout.
 const LAYOUT_BYTES: usize = 64 * 1024;
@@ -26,9 +26,12 @@ pub(crate) fn is_text(bytes: &[u8]) -> bool {
 }
 
 /// Opens a text recording.
-pub(crate) fn open(mut input: Input) -> Result<Opened, RecordingError> {
+pub(crate) fn open(
+    mut input: Input,
+    time_unit: Option<TimeUnit>,
+) -> Result<Opened, RecordingError> {
     let head = input.peek(LAYOUT_BYTES)?;
-    let layout = layout::find(&String::from_utf8_lossy(head))?;
+    let layout = layout::find(&String::from_utf8_lossy(head), time_unit)?;
     let (geometry, assumed) = (layout.geometry, layout.assumed.clone());
     let source = Box::new(Text { input, layout, line: 0 });
     Ok(Opened { format: "CSV", geometry, assumed, about: Vec::new(), source })

@@ -10,7 +10,8 @@ use zip::CompressionMethod;
 use super::header::{ArrayHeader, Elements};
 use super::read::{self, Array, Arrays, Field, NAMES};
 use crate::recording::Opened;
-use crate::recording::csv::{Unit, unit_of_name};
+use crate::recording::TimeUnit;
+use crate::recording::csv::unit_of_name;
 use crate::recording::error::{Place, RecordingError};
 use crate::recording::input::Input;
 
@@ -27,7 +28,7 @@ struct Member {
 }
 
 /// Opens an archive; it must be a file, since its directory stands at its end.
-pub(crate) fn open(path: &Path) -> Result<Opened, RecordingError> {
+pub(crate) fn open(path: &Path, time_unit: Option<TimeUnit>) -> Result<Opened, RecordingError> {
     let members = members(path)?;
     // One array with everything in it, whatever its name.
     for member in &members {
@@ -36,17 +37,21 @@ pub(crate) fn open(path: &Path) -> Result<Opened, RecordingError> {
             && (matches!(&header.elements, Elements::Records(fields) if fields.len() >= 4)
                 || header.shape.len() == 2 && header.shape[1] == 4)
         {
-            let mut opened = read::open(self::input(path, member)?)?;
+            let mut opened = read::open(self::input(path, member)?, time_unit)?;
             opened.format = "NPZ";
             opened.assumed.insert(0, format!("the array \"{}\" holds the events", member.name));
             return Ok(opened);
         }
     }
-    columns(path, &members)
+    columns(path, &members, time_unit)
 }
 
 /// One array for each quantity.
-fn columns(path: &Path, members: &[Member]) -> Result<Opened, RecordingError> {
+fn columns(
+    path: &Path,
+    members: &[Member],
+    time_unit: Option<TimeUnit>,
+) -> Result<Opened, RecordingError> {
     let names: Vec<&str> = members.iter().map(|member| member.name.as_str()).collect();
     let mut arrays = Vec::new();
     let mut fields = Vec::new();
@@ -74,9 +79,8 @@ fn columns(path: &Path, members: &[Member]) -> Result<Opened, RecordingError> {
         arrays.push(Array { input, stride: kind.bytes });
     }
     let fields: [Field; 4] = fields.try_into().map_err(|_| damaged("no four arrays".to_owned()))?;
-    let mut source = Arrays { arrays, fields, unit: Unit::Microseconds, left, record: 0 };
-    let mut assumed = Vec::new();
-    source.find_unit(told, &mut assumed)?;
+    let mut source = Arrays { arrays, fields, unit: TimeUnit::Microseconds, left, record: 0 };
+    let assumed = vec![source.find_unit(time_unit, told)?];
     Ok(Opened {
         format: "NPZ",
         geometry: None,

@@ -3,7 +3,8 @@
 use evtach_core::{Event, Polarity};
 
 use super::header::{ArrayHeader, Elements, Kind, Number};
-use crate::recording::csv::{Unit, unit_of_name};
+use crate::recording::TimeUnit;
+use crate::recording::csv::unit_of_name;
 use crate::recording::error::{Place, RecordingError};
 use crate::recording::input::Input;
 use crate::recording::{Opened, Side, Source};
@@ -35,7 +36,10 @@ pub const NAMES: [&[&str]; 4] = [
 ];
 
 /// Opens a single array.
-pub(crate) fn open(mut input: Input) -> Result<Opened, RecordingError> {
+pub(crate) fn open(
+    mut input: Input,
+    time_unit: Option<TimeUnit>,
+) -> Result<Opened, RecordingError> {
     let header = ArrayHeader::read(&mut input)?;
     let unsupported = |what: &str| RecordingError::Unsupported {
         what: what.to_owned(),
@@ -81,11 +85,11 @@ pub(crate) fn open(mut input: Input) -> Result<Opened, RecordingError> {
     let mut source = Arrays {
         arrays: vec![Array { input, stride }],
         fields,
-        unit: Unit::Microseconds,
+        unit: TimeUnit::Microseconds,
         left: count,
         record: 0,
     };
-    source.find_unit(told, &mut assumed)?;
+    assumed.push(source.find_unit(time_unit, told)?);
     Ok(Opened {
         format: "NPY",
         geometry: None,
@@ -115,38 +119,36 @@ fn plain_order(
 pub struct Arrays {
     pub arrays: Vec<Array>,
     pub fields: [Field; 4],
-    pub unit: Unit,
+    pub unit: TimeUnit,
     /// Events that the header promises and that have not come yet.
     pub left: u64,
     pub record: u64,
 }
 
 impl Arrays {
-    /// Settles the unit of time: as told by the field's name, else from the first numbers.
+    /// Settles the unit of time, and says how: as stated, else as told by the field's name, else from the first numbers.
     pub fn find_unit(
         &mut self,
-        told: Option<Unit>,
-        assumed: &mut Vec<String>,
-    ) -> Result<(), RecordingError> {
+        stated: Option<TimeUnit>,
+        told: Option<TimeUnit>,
+    ) -> Result<String, RecordingError> {
         let Field { array, offset, kind } = self.fields[0];
-        let how = if told.is_some() { "as its field says" } else { "from the first values" };
-        self.unit = match told {
-            Some(unit) => unit,
-            None if kind.is_float() => {
-                let stride = self.arrays[array].stride;
-                let times: Vec<f64> = self.arrays[array]
-                    .input
-                    .peek(stride * 256)?
-                    .chunks_exact(stride)
-                    .take(256)
-                    .map(|record| kind.read(&record[offset..]).as_f64())
-                    .collect();
-                Unit::from_times(&times)
-            }
-            None => Unit::Microseconds,
+        let seen = if kind.is_float() {
+            let stride = self.arrays[array].stride;
+            let times: Vec<f64> = self.arrays[array]
+                .input
+                .peek(stride * 256)?
+                .chunks_exact(stride)
+                .take(256)
+                .map(|record| kind.read(&record[offset..]).as_f64())
+                .collect();
+            TimeUnit::from_times(&times)
+        } else {
+            TimeUnit::Microseconds
         };
-        assumed.push(format!("time in {}, {how}", self.unit.name()));
-        Ok(())
+        let (unit, sentence) = TimeUnit::settle(stated, told, "field", seen);
+        self.unit = unit;
+        Ok(sentence)
     }
 
     fn event(&self, index: usize) -> Result<Event, String> {
@@ -175,7 +177,7 @@ fn pixel(number: Number) -> u16 {
     if (0.0..65535.0).contains(&value) { value as u16 } else { u16::MAX }
 }
 
-fn microseconds(number: Number, unit: Unit) -> Option<u64> {
+fn microseconds(number: Number, unit: TimeUnit) -> Option<u64> {
     let exponent = unit.exponent();
     match number {
         Number::Unsigned(value) if exponent == 0 => Some(value),
