@@ -20,7 +20,11 @@ fn reading(seed: u8) -> Reading {
             y_px: -0.0,
             radius_px: f32::MIN_POSITIVE,
             blades: (seed & 1 == 0).then_some(seed),
-            status: if index & 1 == 0 { Status::Coarse } else { Status::Refused(Reason::Ambiguous) },
+            status: if index & 1 == 0 {
+                Status::Coarse
+            } else {
+                Status::Refused(Reason::Ambiguous)
+            },
             speed: (index & 1 == 0).then_some(Speed {
                 omega_rad_s: [0.0, f32::INFINITY, -1e38, 1e-38, 314.0][usize::from(seed) % 5],
                 omega_sigma_rad_s: f32::NAN,

@@ -8,13 +8,15 @@ use libfuzzer_sys::fuzz_target;
 fuzz_target!(|data: &[u8]| {
     let Some((&first, data)) = data.split_first() else { return };
     let geometry = Geometry { width_px: 320, height_px: 320 };
-    let mut bridge = Bridge::new(if first & 1 == 0 { Kind::Evt2 } else { Kind::Evt3 }, geometry, "fuzz");
+    let mut bridge =
+        Bridge::new(if first & 1 == 0 { Kind::Evt2 } else { Kind::Evt3 }, geometry, "fuzz");
     let (mut stream, mut sent) = (Vec::new(), Vec::new());
     let mut t_us = 0;
     // A byte is an event, and the time to the next.
     for (index, byte) in data.iter().enumerate().take(4096) {
         t_us += u64::from(*byte) * if byte & 1 == 0 { 1 } else { 100_000 };
-        let event = Event { t_us, x: index as u16 % 320, y: u16::from(*byte), polarity: Polarity::On };
+        let event =
+            Event { t_us, x: index as u16 % 320, y: u16::from(*byte), polarity: Polarity::On };
         bridge.push(&event, |frame| stream.extend_from_slice(frame));
         sent.push(event);
     }

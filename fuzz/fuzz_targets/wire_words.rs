@@ -12,7 +12,9 @@ fuzz_target!(|data: &[u8]| {
         evt2.decode(u32::from_le_bytes(*word), |event| assert!(event.x < 2048 && event.y < 2048));
     }
     for word in data.as_chunks().0 {
-        evt21.decode(u64::from_le_bytes(*word), |event| assert!(event.x < 2048 + 32 && event.y < 2048));
+        evt21.decode(u64::from_le_bytes(*word), |event| {
+            assert!(event.x < 2048 + 32 && event.y < 2048)
+        });
     }
     for word in data.as_chunks().0 {
         let word = u16::from_le_bytes(*word);

@@ -10,7 +10,10 @@ use evtach_host::recording::{self, OpenOptions, Recording, RecordingError};
 pub fn read_behind(prefix: &[u8], data: &[u8]) {
     for geometry in [None, Geometry::new(640, 480)] {
         let bytes = [prefix, data].concat();
-        drain(recording::open_reader(Box::new(Cursor::new(bytes)), &OpenOptions { geometry, ..OpenOptions::default() }));
+        drain(recording::open_reader(
+            Box::new(Cursor::new(bytes)),
+            &OpenOptions { geometry, ..OpenOptions::default() },
+        ));
     }
 }
 
@@ -23,7 +26,11 @@ pub fn read_file(data: &[u8]) {
 }
 
 fn scratch() -> PathBuf {
-    let folder = if std::path::Path::new("/dev/shm").is_dir() { "/dev/shm".into() } else { std::env::temp_dir() };
+    let folder = if std::path::Path::new("/dev/shm").is_dir() {
+        "/dev/shm".into()
+    } else {
+        std::env::temp_dir()
+    };
     folder.join(format!("evtach-fuzz-{}", std::process::id()))
 }
 
@@ -46,7 +53,9 @@ fn drain(opened: Result<Recording, RecordingError>) {
                 check(&error);
                 // Behind damage there is nothing more.
                 events.clear();
-                assert!(matches!(recording.read_chunk(&mut events), Ok(false)) && events.is_empty());
+                assert!(
+                    matches!(recording.read_chunk(&mut events), Ok(false)) && events.is_empty()
+                );
                 break;
             }
         }
