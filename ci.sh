@@ -4,7 +4,7 @@
 #   ./ci.sh            all steps, in this order: install format lint test bench board docs image budget fuzz deny
 #   ./ci.sh STEP...    only these
 #
-# Not more than half an hour on two cores from nothing; a few minutes when built before.
+# Less than an hour on two cores from nothing; half of it is compiling.
 set -euo pipefail
 cd "$(dirname "$0")"
 
