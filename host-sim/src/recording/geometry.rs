@@ -64,9 +64,23 @@ pub fn of_extent(columns: u16, rows: u16) -> Option<Geometry> {
         .or(Some(extent))
 }
 
-/// How a size is written for people.
-pub fn show(geometry: Geometry) -> String {
-    format!("{}x{}", geometry.width_px, geometry.height_px)
+/// The size of a recording's sensor, and how it is known.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct KnownSize {
+    pub size: Geometry,
+    /// "from the header"
+    pub how: String,
+}
+
+impl KnownSize {
+    pub fn new(size: Geometry, how: impl Into<String>) -> Self {
+        Self { size, how: how.into() }
+    }
+
+    /// A sentence for people: "640x480 from the header".
+    pub fn sentence(&self) -> String {
+        format!("{}x{} {}", self.size.width_px, self.size.height_px, self.how)
+    }
 }
 
 #[cfg(test)]

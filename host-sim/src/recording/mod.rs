@@ -55,7 +55,8 @@ pub struct OpenOptions {
 /// What a format's reader knows after its header.
 pub(crate) struct Opened {
     pub format: &'static str,
-    pub geometry: Option<Geometry>,
+    pub geometry: Option<geometry::KnownSize>,
+    /// What else was assumed, one sentence each.
     pub assumed: Vec<String>,
     pub about: Vec<(String, String)>,
     pub source: Box<dyn Source>,
@@ -117,11 +118,13 @@ impl Recording {
     /// More than one step back in so many events is no time order.
     const SHUFFLED_ONE_OF: u64 = 10;
 
-    fn new(opened: Opened, geometry: Geometry, progress: Progress) -> Self {
+    fn new(opened: Opened, geometry: &geometry::KnownSize, progress: Progress) -> Self {
+        let mut assumed = opened.assumed;
+        assumed.insert(0, geometry.sentence());
         Self {
             format: opened.format,
-            geometry,
-            assumed: opened.assumed,
+            geometry: geometry.size,
+            assumed,
             about: opened.about,
             source: opened.source,
             progress,

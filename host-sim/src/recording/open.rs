@@ -6,15 +6,16 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use evtach_core::{Event, Geometry};
+use evtach_core::Event;
 use flate2::read::MultiGzDecoder;
 
 use super::error::RecordingError;
+use super::geometry::{self, KnownSize};
 use super::input::Input;
 use super::prophesee_header::Header;
 use super::{
-    OpenOptions, Opened, Recording, Side, TimeUnit, aedat2, aedat3, aedat4, csv, dat, es, ev8,
-    geometry, npy, raw, ros2, spi,
+    OpenOptions, Opened, Recording, Side, TimeUnit, aedat2, aedat3, aedat4, csv, dat, es, ev8, npy,
+    raw, ros2, spi,
 };
 
 /// Bytes looked at to tell text from binary.
@@ -27,25 +28,24 @@ const SNIFF_BYTES: usize = 4096;
 pub fn open(path: &Path, options: &OpenOptions) -> Result<Recording, RecordingError> {
     let progress = Progress::default();
     let mut opened = recognise(input(path, &progress)?, path, options)?;
-    let geometry = if let Some(geometry) = options.geometry {
-        if let Some(told) = opened.geometry.map(geometry::show) {
-            opened.assumed.retain(|sentence| !sentence.starts_with(&told));
-        }
-        opened.assumed.push(format!("{} as given by --geometry", geometry::show(geometry)));
-        geometry
-    } else if let Some(geometry) = opened.geometry {
+    let geometry = if let Some(geometry) = settled(&mut opened, options) {
         geometry
     } else {
         if path.as_os_str() == "-" {
             return Err(RecordingError::NoGeometry { format: opened.format });
         }
-        let (geometry, sentence) = scan(&mut opened)?;
-        let options = OpenOptions { geometry: Some(geometry), ..*options };
+        let geometry = scan(&mut opened)?;
+        let options = OpenOptions { geometry: Some(geometry.size), ..*options };
         opened = recognise(input(path, &progress)?, path, &options)?;
-        opened.assumed.push(sentence);
         geometry
     };
-    Ok(Recording::new(opened, geometry, progress))
+    Ok(Recording::new(opened, &geometry, progress))
+}
+
+/// The size that the person stated, else what the recording told.
+fn settled(opened: &mut Opened, options: &OpenOptions) -> Option<KnownSize> {
+    let stated = options.geometry.map(|size| KnownSize::new(size, "as given by --geometry"));
+    stated.or(opened.geometry.take())
 }
 
 /// Opens a recording from any source of bytes, as a pipe is read: the size of the sensor must be told by the recording
@@ -60,10 +60,10 @@ pub fn open_reader(
     let progress = Progress::default();
     let read = Arc::clone(&progress.read);
     let input = Input::new(Box::new(Counted { reader, read }));
-    let opened = recognise(input, Path::new("-"), options)?;
-    let told = options.geometry.or(opened.geometry);
-    let geometry = told.ok_or(RecordingError::NoGeometry { format: opened.format })?;
-    Ok(Recording::new(opened, geometry, progress))
+    let mut opened = recognise(input, Path::new("-"), options)?;
+    let geometry = settled(&mut opened, options)
+        .ok_or(RecordingError::NoGeometry { format: opened.format })?;
+    Ok(Recording::new(opened, &geometry, progress))
 }
 
 fn input(path: &Path, progress: &Progress) -> Result<Input, RecordingError> {
@@ -110,7 +110,7 @@ impl<R: Read> Read for Counted<R> {
 }
 
 /// Reads through a recording to see where its events lie.
-fn scan(opened: &mut Opened) -> Result<(Geometry, String), RecordingError> {
+fn scan(opened: &mut Opened) -> Result<KnownSize, RecordingError> {
     let mut events: Vec<Event> = Vec::new();
     let (mut x_max, mut y_max) = (0, 0);
     let mut any = false;
@@ -130,12 +130,11 @@ fn scan(opened: &mut Opened) -> Result<(Geometry, String), RecordingError> {
     let found = any
         .then(|| geometry::of_extent(x_max.saturating_add(1), y_max.saturating_add(1)))
         .flatten();
-    let geometry = found.ok_or(RecordingError::NoGeometry { format: opened.format })?;
-    let sentence = format!(
-        "{} because events lie in columns 0 to {x_max} and rows 0 to {y_max} (the file does not say its size; --geometry overrides)",
-        geometry::show(geometry)
+    let size = found.ok_or(RecordingError::NoGeometry { format: opened.format })?;
+    let how = format!(
+        "because events lie in columns 0 to {x_max} and rows 0 to {y_max} (the file does not say its size; --geometry overrides)"
     );
-    Ok((geometry, sentence))
+    Ok(KnownSize::new(size, how))
 }
 
 /// Formats whose times are bare numbers.

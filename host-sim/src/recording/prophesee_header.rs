@@ -3,7 +3,7 @@
 use evtach_core::Geometry;
 
 use super::error::RecordingError;
-use super::geometry;
+use super::geometry::{self, KnownSize};
 use super::input::Input;
 
 /// Longest header that is read: real ones reach some hundred kilobytes when software dumps its settings into them.
@@ -62,14 +62,13 @@ impl Header {
             .map(|(_, value)| value.trim())
     }
 
-    /// Size of the sensor, with the sentence that says where it comes from.
-    pub fn geometry(&self) -> Option<(Geometry, String)> {
+    /// Size of the sensor.
+    pub fn geometry(&self) -> Option<KnownSize> {
         let sides = |width: Option<&str>, height: Option<&str>| {
             Geometry::new(width?.parse().ok()?, height?.parse().ok()?)
         };
-        let found = |geometry, line: String| {
-            (geometry, format!("{} from the header line {line}", geometry::show(geometry)))
-        };
+        let found =
+            |size, line: String| KnownSize::new(size, format!("from the header line {line}"));
         if let Some(value) = self.get("geometry")
             && let Some(size) = geometry::parse(value)
         {

@@ -6,9 +6,10 @@ use super::Header;
 use super::chip::{self, Address, Layout};
 use crate::recording::clock::Clock32;
 use crate::recording::error::RecordingError;
+use crate::recording::geometry::KnownSize;
 use crate::recording::imu::{ImuSample, from_degrees, from_gravities};
 use crate::recording::input::Input;
-use crate::recording::{Opened, Side, Source, geometry};
+use crate::recording::{Opened, Side, Source};
 
 /// Records decoded in one go.
 const CHUNK_RECORDS: usize = 16 * 1024;
@@ -24,18 +25,14 @@ pub(crate) fn open(
 ) -> Result<Opened, RecordingError> {
     let header = Header::read(&mut input)?;
     let mut assumed = Vec::new();
-    let (layout, size) = match header
-        .get("AEChip:")
-        .and_then(|name| Some((name, chip::of_name(name)?)))
-    {
-        Some((name, (layout, size))) => {
-            assumed
-                .push(format!("{} from the header line \"AEChip: {name}\"", geometry::show(size)));
-            (layout, Some(size))
-        }
-        None => guess(&mut input, address_bytes, &mut assumed)?,
-    };
-    let size = known.or(size);
+    let (layout, geometry) =
+        match header.get("AEChip:").and_then(|name| Some((name, chip::of_name(name)?))) {
+            Some((name, (layout, size))) => (
+                layout,
+                Some(KnownSize::new(size, format!("from the header line \"AEChip: {name}\""))),
+            ),
+            None => guess(&mut input, address_bytes, &mut assumed)?,
+        };
     let gyro_scale = header.gyro_scale();
     if layout == Layout::Davis {
         assumed.push(match gyro_scale {
@@ -50,7 +47,7 @@ pub(crate) fn open(
     let source = Pairs {
         input,
         layout,
-        flip: size,
+        flip: known.or(geometry.as_ref().map(|told| told.size)),
         record_bytes: address_bytes + 4,
         clock: Clock32::default(),
         imu: Imu {
@@ -61,7 +58,7 @@ pub(crate) fn open(
         },
     };
     let about = header.about();
-    Ok(Opened { format, geometry: size, assumed, about, source: Box::new(source) })
+    Ok(Opened { format, geometry, assumed, about, source: Box::new(source) })
 }
 
 /// Full scale of the gyroscope in degrees per second as jAER sets it up.
@@ -105,16 +102,13 @@ fn guess(
     input: &mut Input,
     address_bytes: usize,
     assumed: &mut Vec<String>,
-) -> Result<(Layout, Option<Geometry>), RecordingError> {
+) -> Result<(Layout, Option<KnownSize>), RecordingError> {
     let bytes = input.peek(GUESS_BYTES)?;
     let small =
         address_bytes == 2 || bytes.chunks_exact(8).all(|record| record[0] == 0 && record[1] == 0);
     Ok(if small {
-        assumed.push(
-            "128x128, a DVS128: the header names no camera and the addresses have 16 bits"
-                .to_owned(),
-        );
-        (Layout::Dvs128, Geometry::new(128, 128))
+        let how = "of a DVS128: the header names no camera and the addresses have 16 bits";
+        (Layout::Dvs128, Geometry::new(128, 128).map(|size| KnownSize::new(size, how)))
     } else {
         assumed
             .push("a DAVIS: the header names no camera and the addresses have 32 bits".to_owned());

@@ -4,9 +4,10 @@ use evtach_core::{Event, Geometry, Polarity};
 
 use crate::recording::aedat2::Header;
 use crate::recording::error::{Place, RecordingError};
+use crate::recording::geometry::KnownSize;
 use crate::recording::imu::{ImuSample, from_degrees, from_gravities};
 use crate::recording::input::Input;
-use crate::recording::{Opened, Side, Source, geometry};
+use crate::recording::{Opened, Side, Source};
 
 const HEADER_BYTES: usize = 28;
 /// Largest packet that is read: the bound on this reader's memory.
@@ -29,12 +30,10 @@ pub(crate) fn open(mut input: Input, known: Option<Geometry>) -> Result<Opened, 
         });
     }
     let source_line = header.lines.iter().find(|line| line.starts_with("Source "));
-    let mut assumed = Vec::new();
-    let told = source_line.and_then(|line| Some((line, size_of_source(line)?)));
-    let size = known.or(told.map(|(_, size)| size));
-    if let Some((line, size)) = told {
-        assumed.push(format!("{} from the header line \"{line}\"", geometry::show(size)));
-    }
+    let geometry = source_line.and_then(|line| {
+        Some(KnownSize::new(size_of_source(line)?, format!("from the header line \"{line}\"")))
+    });
+    let size = known.or(geometry.as_ref().map(|told| told.size));
     let about = header
         .lines
         .iter()
@@ -43,7 +42,7 @@ pub(crate) fn open(mut input: Input, known: Option<Geometry>) -> Result<Opened, 
         .collect();
     let flip = if flip { size } else { None };
     let source = Box::new(Packets { input, flip });
-    Ok(Opened { format: "AEDAT3", geometry: size, assumed, about, source })
+    Ok(Opened { format: "AEDAT3", geometry, assumed: Vec::new(), about, source })
 }
 
 /// Size of the camera in a line such as "Source 1: DAVIS346".

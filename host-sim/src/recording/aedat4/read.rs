@@ -6,9 +6,10 @@ use super::flat::Table;
 use super::header::Header;
 use super::packet::{Found, Packets};
 use crate::recording::error::{Place, RecordingError};
+use crate::recording::geometry::KnownSize;
 use crate::recording::imu::{ImuSample, from_degrees, from_gravities};
 use crate::recording::input::Input;
-use crate::recording::{Opened, Side, Source, geometry};
+use crate::recording::{Opened, Side, Source};
 
 /// Opens an AEDAT 4 file.
 pub(crate) fn open(mut input: Input) -> Result<Opened, RecordingError> {
@@ -21,14 +22,10 @@ pub(crate) fn open(mut input: Input) -> Result<Opened, RecordingError> {
             advice: "record again with the event stream switched on".to_owned(),
         });
     };
+    let geometry = stream
+        .geometry
+        .map(|size| KnownSize::new(size, format!("from the header of stream {}", stream.id)));
     let mut assumed = Vec::new();
-    if let Some(geometry) = stream.geometry {
-        assumed.push(format!(
-            "{} from the header of stream {}",
-            geometry::show(geometry),
-            stream.id
-        ));
-    }
     let others: Vec<String> = streams.map(|other| other.id.to_string()).collect();
     if !others.is_empty() {
         assumed.push(format!(
@@ -48,13 +45,7 @@ pub(crate) fn open(mut input: Input) -> Result<Opened, RecordingError> {
         imu_stream: header.of_kind("IMUS").next().map(|stream| stream.id),
         notes: side_notes,
     };
-    Ok(Opened {
-        format: "AEDAT4",
-        geometry: stream.geometry,
-        assumed,
-        about,
-        source: Box::new(source),
-    })
+    Ok(Opened { format: "AEDAT4", geometry, assumed, about, source: Box::new(source) })
 }
 
 struct Aedat4 {

@@ -76,9 +76,6 @@ pub fn find(head: &str, stated_unit: Option<TimeUnit>) -> Result<Layout, Recordi
     if rows.is_empty() {
         return Err(not_events(layout.skip_lines + 1, head.lines().next().unwrap_or_default()));
     }
-    if let Some(geometry) = layout.geometry {
-        layout.assumed.push(format!("{} from the first lines", geometry::show(geometry)));
-    }
     let mut told_unit = None;
     if let Some(names) = names {
         for (column, found) in layout.columns.iter_mut().zip(&names) {

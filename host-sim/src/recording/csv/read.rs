@@ -4,6 +4,7 @@ use evtach_core::{Event, Polarity};
 
 use super::layout::{self, Layout};
 use crate::recording::error::{Place, RecordingError};
+use crate::recording::geometry::KnownSize;
 use crate::recording::input::Input;
 use crate::recording::{Opened, Side, Source, TimeUnit};
 
@@ -31,8 +32,9 @@ pub(crate) fn open(
     time_unit: Option<TimeUnit>,
 ) -> Result<Opened, RecordingError> {
     let head = input.peek(LAYOUT_BYTES)?;
-    let layout = layout::find(&String::from_utf8_lossy(head), time_unit)?;
-    let (geometry, assumed) = (layout.geometry, layout.assumed.clone());
+    let mut layout = layout::find(&String::from_utf8_lossy(head), time_unit)?;
+    let geometry = layout.geometry.map(|size| KnownSize::new(size, "from the first lines"));
+    let assumed = std::mem::take(&mut layout.assumed);
     let source = Box::new(Text { input, layout, line: 0 });
     Ok(Opened { format: "CSV", geometry, assumed, about: Vec::new(), source })
 }

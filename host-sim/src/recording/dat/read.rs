@@ -20,18 +20,14 @@ pub(crate) fn is_dat(kind: &[u8]) -> bool {
 /// Opens a DAT file behind its header.
 pub(crate) fn open(mut input: Input, header: Header) -> Opened {
     input.consume(header.length + 2);
-    let mut assumed = Vec::new();
-    let geometry = header.geometry().map(|(geometry, sentence)| {
-        assumed.push(sentence);
-        geometry
-    });
+    let geometry = header.geometry();
     // The first version of the format packs x into 9 bits and y into 8.
     let layout = match header.get("Version").and_then(|version| version.parse::<u32>().ok()) {
         Some(0 | 1) => Layout { x_bits: 9, y_bits: 8 },
         _ => Layout { x_bits: 14, y_bits: 14 },
     };
     let source = Box::new(Dat { input, layout, clock: Clock32::default() });
-    Opened { format: "DAT", geometry, assumed, about: header.fields, source }
+    Opened { format: "DAT", geometry, assumed: Vec::new(), about: header.fields, source }
 }
 
 #[derive(Clone, Copy)]

@@ -4,8 +4,9 @@ use evtach_core::{Event, Geometry, Polarity};
 
 use super::{HEADER_BYTES, MAGIC, TYPE_ATIS, TYPE_DVS};
 use crate::recording::error::{Place, RecordingError};
+use crate::recording::geometry::KnownSize;
 use crate::recording::input::Input;
-use crate::recording::{Opened, Side, Source, geometry};
+use crate::recording::{Opened, Side, Source};
 
 /// Bytes decoded in one go.
 const CHUNK_BYTES: usize = 64 * 1024;
@@ -45,8 +46,8 @@ pub(crate) fn open(mut input: Input) -> Result<Opened, RecordingError> {
     input.consume(HEADER_BYTES);
     Ok(Opened {
         format: "ES",
-        geometry: Some(size),
-        assumed: vec![format!("{} from the header", geometry::show(size))],
+        geometry: Some(KnownSize::new(size, "from the header")),
+        assumed: Vec::new(),
         about: vec![("version".to_owned(), format!("{major}.{minor}.{patch}"))],
         source: Box::new(Stream { input, atis: kind == TYPE_ATIS, height, t_us: 0 }),
     })

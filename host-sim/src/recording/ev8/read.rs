@@ -4,8 +4,9 @@ use evtach_core::Event;
 use evtach_firmware::record::{Decoder, Header, HeaderError, RECORD_BYTES};
 
 use crate::recording::error::{Place, RecordingError};
+use crate::recording::geometry::KnownSize;
 use crate::recording::input::Input;
-use crate::recording::{Opened, Side, Source, geometry};
+use crate::recording::{Opened, Side, Source};
 
 /// Bytes decoded in one go.
 const CHUNK_BYTES: usize = 64 * 1024;
@@ -30,8 +31,8 @@ pub(crate) fn open(mut input: Input) -> Result<Opened, RecordingError> {
     let left = u64::from(header.events);
     Ok(Opened {
         format: "EV8",
-        geometry: Some(header.geometry),
-        assumed: vec![format!("{} from the header", geometry::show(header.geometry))],
+        geometry: Some(KnownSize::new(header.geometry, "from the header")),
+        assumed: Vec::new(),
         about: vec![("recorded by".to_owned(), "EV-Tach".to_owned())],
         source: Box::new(Stream { input, decoder: Decoder::new(header.first_us), left }),
     })

@@ -40,12 +40,8 @@ pub(crate) fn open(mut input: Input, header: Header) -> Result<Opened, Recording
             });
         }
     };
-    let mut assumed = Vec::new();
-    let geometry = header.geometry().map(|(geometry, sentence)| {
-        assumed.push(sentence);
-        geometry
-    });
-    Ok(Opened { format, geometry, assumed, about: header.fields, source })
+    let geometry = header.geometry();
+    Ok(Opened { format, geometry, assumed: Vec::new(), about: header.fields, source })
 }
 
 /// The encoding a header names.

@@ -14,8 +14,9 @@ use events::PacketDecoder;
 use packet::EventPacket;
 
 use super::error::{Place, RecordingError};
+use super::geometry::KnownSize;
 use super::input::Input;
-use super::{Opened, Side, Source, geometry};
+use super::{Opened, Side, Source};
 
 /// First bytes of an MCAP file.
 pub(crate) const MCAP_MAGIC: &[u8] = b"\x89MCAP0\r\n";
@@ -63,12 +64,9 @@ fn open(format: &'static str, mut messages: Box<dyn Messages>) -> Result<Opened,
     };
     let damaged = |what| RecordingError::Damaged { format, place: Place::Record(0), what };
     let packet = EventPacket::parse(&first).map_err(damaged)?;
-    let size = packet.size();
+    let geometry = packet.size().map(|size| KnownSize::new(size, "from the first message"));
     let decoder = PacketDecoder::new(packet.encoding)?;
     let mut assumed = messages.assumed();
-    if let Some(size) = size {
-        assumed.push(format!("{} from the first message", geometry::show(size)));
-    }
     assumed.push(format!("encoding \"{}\" from the first message", packet.encoding));
     let about = vec![("frame_id".to_owned(), packet.frame_id.to_owned())];
     let bag = Bag {
@@ -80,7 +78,7 @@ fn open(format: &'static str, mut messages: Box<dyn Messages>) -> Result<Opened,
         sequence: None,
         missing: 0,
     };
-    Ok(Opened { format, geometry: size, assumed, about, source: Box::new(bag) })
+    Ok(Opened { format, geometry, assumed, about, source: Box::new(bag) })
 }
 
 impl EventPacket<'_> {

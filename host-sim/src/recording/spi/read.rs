@@ -4,8 +4,9 @@ use evtach_core::Event;
 use evtach_firmware::sensor::spi::{Account, Hello, Kind, Lost, Parser, Words};
 
 use crate::recording::error::RecordingError;
+use crate::recording::geometry::KnownSize;
 use crate::recording::input::Input;
-use crate::recording::{Opened, Side, Source, geometry};
+use crate::recording::{Opened, Side, Source};
 
 /// Bytes before the first hello: a bridge says it every 100 ms, which is 1.25 MB on a bus of 100 MHz.
 const LATEST_HELLO_BYTES: u64 = 1 << 21;
@@ -26,11 +27,10 @@ pub(crate) fn open(mut input: Input) -> Result<Opened, RecordingError> {
             });
         }
     };
-    let size = hello.geometry;
     Ok(Opened {
         format: "SPI",
-        geometry: Some(size),
-        assumed: vec![format!("{} from the stream", geometry::show(size))],
+        geometry: Some(KnownSize::new(hello.geometry, "from the stream")),
+        assumed: Vec::new(),
         about: vec![("sensor".to_owned(), hello.name().to_owned())],
         source: Box::new(Stream { input, parser, account, ended: false }),
     })
