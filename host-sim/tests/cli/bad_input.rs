@@ -109,29 +109,39 @@ fn no_geometry() {
     assert!(run.stderr.contains("--geometry"), "{}", run.stderr);
 }
 
-/// Times in milliseconds may look like microseconds: that is told, and what overrides it.
+/// Thousandths may be milliseconds or microseconds: which is told or asked, and nothing is measured in the wrong one.
 #[test]
 fn a_unit_that_no_name_says() {
     let folder = folder();
-    let path = folder.path().join("ms.csv").display().to_string();
-    let rows = rotor().into_iter().map(|e| {
-        format!("{}.{:03},{},{},{}\n", e.t_us / 1000, e.t_us % 1000, e.x, e.y, e.polarity as u8)
-    });
-    std::fs::write(&path, rows.collect::<String>()).expect("room on the disk");
-    let run = evtach(&["measure", "--geometry", "200x160", &path], b"");
-    let guess = "time in microseconds, from the first events; --time-unit overrides";
+    let thousandths = |name: &str, scale: u64| {
+        let path = folder.path().join(name).display().to_string();
+        let rows = rotor().into_iter().map(|e| {
+            let t = e.t_us * scale;
+            format!("{}.{:03},{},{},{}\n", t / 1000, t % 1000, e.x, e.y, e.polarity as u8)
+        });
+        std::fs::write(&path, rows.collect::<String>()).expect("room on the disk");
+        path
+    };
+    let measure = |more: &[&str], path: &str| {
+        evtach(&[&["measure", "--geometry", "200x160"], more, &[path]].concat(), b"")
+    };
+    let path = thousandths("ms.csv", 1);
+    let run = measure(&[], &path);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let guess = "time in milliseconds, from the first events; --time-unit overrides";
     assert!(run.stderr.contains(guess), "{}", run.stderr);
+    assert_reads_the_rotor(&run.stdout);
+    let run = measure(&["--time-unit", "us"], &path);
     // A thousand times as fast as it turns: no rotor does.
     assert_eq!(run.code, Some(1), "{}", run.stdout);
-    let run = evtach(&["measure", "--geometry", "200x160", "--time-unit", "ms", &path], b"");
-    assert_eq!(run.code, Some(0), "{}", run.stderr);
-    assert!(run.stderr.contains("time in milliseconds, as given by --time-unit"), "{}", run.stderr);
+    assert!(run.stderr.contains("time in microseconds, as given by --time-unit"), "{}", run.stderr);
     assert!(run.stderr.contains("200x160 as given by --geometry"), "{}", run.stderr);
-    assert_reads_the_rotor(&run.stdout);
+    // A hundred times slower: in microseconds it would be ten times faster than it is.
+    let path = thousandths("either.csv", 100);
+    assert_refused_as_bad(&measure(&[], &path), "give --time-unit");
     // What says its unit itself is not read in another.
     let raw = write(&folder, "rotor.raw", &rotor()).display().to_string();
-    let run = evtach(&["measure", "--time-unit", "ms", &raw], b"");
-    assert_refused_as_bad(&run, "leave out --time-unit");
+    assert_refused_as_bad(&measure(&["--time-unit", "ms"], &raw), "leave out --time-unit");
 }
 
 /// From a pipe it cannot be inferred: reading twice is not possible.

@@ -90,8 +90,8 @@ pub fn find(head: &str, stated_unit: Option<TimeUnit>) -> Result<Layout, Recordi
             if vendor_order { " (as %geometry files have them)" } else { " from the first rows" }
         ));
     }
-    let seen = TimeUnit::from_times(&column(&rows, layout.columns[0]));
-    let (unit, sentence) = TimeUnit::settle(stated_unit, told_unit, "column", seen);
+    let seen = TimeUnit::from_times(&column(&rows, layout.columns[0]), f64::EPSILON);
+    let (unit, sentence) = TimeUnit::settle(stated_unit, told_unit, "column", seen)?;
     layout.unit = unit;
     layout.assumed.push(sentence);
     Ok(layout)

@@ -142,11 +142,12 @@ impl Arrays {
                 .take(256)
                 .map(|record| kind.read(&record[offset..]).as_f64())
                 .collect();
-            TimeUnit::from_times(&times)
+            let single = kind.bytes <= size_of::<f32>();
+            TimeUnit::from_times(&times, if single { f32::EPSILON.into() } else { f64::EPSILON })
         } else {
-            TimeUnit::Microseconds
+            Some(TimeUnit::Microseconds)
         };
-        let (unit, sentence) = TimeUnit::settle(stated, told, "field", seen);
+        let (unit, sentence) = TimeUnit::settle(stated, told, "field", seen)?;
         self.unit = unit;
         Ok(sentence)
     }
