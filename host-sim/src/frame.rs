@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 use std::fs::File;
-use std::io::{BufReader, BufWriter, Seek, Write};
+use std::io::{BufReader, Seek};
 use std::path::{Path, PathBuf};
 
 use embedded_graphics::pixelcolor::{Rgb565, Rgb888};
@@ -61,26 +61,30 @@ impl Frame {
         &self.pixels
     }
 
-    /// Writes it as PNG, eight bits a colour.
+    /// The picture as PNG, eight bits a colour.
+    ///
+    /// # Errors
+    ///
+    /// None that is known: memory takes what the encoder writes.
+    pub fn png(&self) -> Result<Vec<u8>, png::EncodingError> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, SIZE.width, SIZE.height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_compression(png::Compression::High);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&self.rgb())?;
+        writer.finish()?;
+        Ok(bytes)
+    }
+
+    /// Writes it as PNG.
     ///
     /// # Errors
     ///
     /// When the file cannot be written.
     pub fn write_png(&self, path: &Path) -> Result<(), FrameError> {
-        let failed = |source| FrameError::File { path: path.into(), source };
-        let mut file = BufWriter::new(File::create(path).map_err(failed)?);
-        self.encode(&mut file)
-            .map_err(|source| FrameError::Encode { path: path.into(), source })?;
-        file.flush().map_err(failed)
-    }
-
-    fn encode(&self, file: impl Write) -> Result<(), png::EncodingError> {
-        let mut encoder = png::Encoder::new(file, SIZE.width, SIZE.height);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_compression(png::Compression::High);
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(&self.rgb())?;
-        writer.finish()
+        let png = self.png().map_err(|source| FrameError::Encode { path: path.into(), source })?;
+        std::fs::write(path, png).map_err(|source| FrameError::File { path: path.into(), source })
     }
 
     /// Eight bits a colour, row by row.

@@ -1,5 +1,6 @@
 //! `evtach convert`.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -11,6 +12,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::how::parse_roi;
 use super::keep_apart;
+use super::span::Span;
 use super::stated::Stated;
 use super::wait::LONGEST_US;
 
@@ -29,12 +31,8 @@ pub struct Args {
     /// Keep only the events in this rectangle of pixels; places stay as they are.
     #[arg(long, value_name = "X,Y,W,H", value_parser = parse_roi)]
     roi: Option<Roi>,
-    /// Leave out what comes before this many seconds from the first event.
-    #[arg(long, value_name = "S")]
-    start: Option<f64>,
-    /// Leave out what comes after this many seconds from the first event.
-    #[arg(long, value_name = "S")]
-    end: Option<f64>,
+    #[command(flatten)]
+    span: Span,
     /// Keep one event in N.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     decimate: u64,
@@ -130,11 +128,11 @@ struct Picker {
 impl Picker {
     fn new(args: &Args, format: WriteFormat) -> Self {
         let (latest_us, ordered) = format.limits();
-        let micros = |seconds: f64| (seconds * 1e6).round() as u64;
+        let Range { start: start_us, end: end_us } = args.span.since_us();
         Self {
             roi: args.roi,
-            start_us: args.start.map_or(0, micros),
-            end_us: args.end.map_or(u64::MAX, micros),
+            start_us,
+            end_us,
             decimate: args.decimate,
             rebase: args.rebase,
             latest_us,
@@ -153,7 +151,7 @@ impl Picker {
         for event in events {
             let (first_us, shift_us) = self.origin(event.t_us);
             let since_us = event.t_us.saturating_sub(first_us);
-            if since_us > self.end_us {
+            if since_us >= self.end_us {
                 // Recorders write inertial samples behind the events of their time.
                 wanted = since_us - self.end_us <= LONGEST_US;
                 if wanted {
@@ -186,7 +184,7 @@ impl Picker {
     fn take_imu(&mut self, samples: &mut Vec<ImuSample>) -> Vec<ImuSample> {
         let Some((first_us, shift_us)) = self.origin else { return Vec::new() };
         let from_us = if self.start_us > 0 { first_us.saturating_add(self.start_us) } else { 0 };
-        let wanted_us = from_us..=first_us.saturating_add(self.end_us);
+        let wanted_us = from_us..first_us.saturating_add(self.end_us);
         let wanted = samples.drain(..).filter(|sample| wanted_us.contains(&sample.t_us));
         let mut wanted: Vec<ImuSample> = wanted
             .filter_map(|sample| {

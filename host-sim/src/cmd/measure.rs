@@ -13,6 +13,7 @@ use evtach_host::measure::{
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::how::How;
+use super::span::Span;
 use super::wait::Wait;
 use super::{in_order, say};
 
@@ -27,12 +28,8 @@ pub struct Args {
     json: bool,
     #[command(flatten)]
     how: How,
-    /// Start this many seconds after the first event.
-    #[arg(long, value_name = "SECONDS")]
-    start: Option<f64>,
-    /// End this many seconds after the first event.
-    #[arg(long, value_name = "SECONDS")]
-    end: Option<f64>,
+    #[command(flatten)]
+    span: Span,
     /// Show what each stage found, and why something was refused.
     #[arg(short, long)]
     verbose: bool,
@@ -91,10 +88,8 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
             }
             if let Some(first) = chunk.first() {
                 let origin_us = *origin_us.get_or_insert(first.t_us);
-                let at = |seconds: f64| origin_us.saturating_add((seconds * 1e6) as u64);
-                let from_us = args.start.map_or(0, at);
-                let to_us = args.end.map_or(u64::MAX, at);
-                chunk.retain(|event| event.t_us >= from_us && event.t_us < to_us);
+                let wanted = args.span.since_us();
+                chunk.retain(|event| wanted.contains(&event.t_us.saturating_sub(origin_us)));
             }
             tachometer.lost(recording.lost() - known_lost);
             known_lost = recording.lost();
@@ -134,8 +129,7 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
             "{name}: the recording holds no events; record again, or check the format with `evtach info`"
         );
     }
-    if readings.is_empty() && (args.start.is_some() || args.end.is_some() || args.how.roi.is_some())
-    {
+    if readings.is_empty() && (!args.span.is_all() || args.how.roi.is_some()) {
         bail!("{name}: no events between --start and --end inside --roi; widen them");
     }
     for note in &recording.side().notes {
@@ -155,9 +149,9 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
     let summary = summarise(&readings, &(facts.first_us..facts.last_us), args.how.clock_ppm);
     if args.json {
         let document = Document::new(&facts, &summary, &readings);
-        say(&format!("{}\n", serde_json::to_string(&document)?))?;
+        say(format!("{}\n", serde_json::to_string(&document)?))?;
     } else {
-        say(&table(&facts, &summary, &readings))?;
+        say(table(&facts, &summary, &readings))?;
     }
     if args.verbose {
         eprint!("{}", evidence(&readings, facts.first_us));

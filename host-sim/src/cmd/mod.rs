@@ -13,6 +13,7 @@ pub mod info;
 pub mod measure;
 pub mod plot;
 pub mod screen;
+mod span;
 mod stated;
 pub mod synth;
 mod wait;
@@ -41,10 +42,21 @@ fn in_order(recording: &Recording, name: &str) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Writes what is whole in memory to a file and says on stdout what it is, or to stdout for "-" and says it on stderr.
+fn deliver(out: &Path, bytes: &[u8], said: &str) -> anyhow::Result<()> {
+    if out == Path::new("-") {
+        eprintln!("{said}");
+        return say(bytes);
+    }
+    std::fs::write(out, bytes)
+        .with_context(|| format!("{}: cannot be written; choose another place", out.display()))?;
+    say(format!("{said}\n"))
+}
+
 /// Prints an answer. Where there is no room for it, that is an error as any other; where nobody reads any more, it is none.
-fn say(answer: &str) -> anyhow::Result<()> {
+fn say(answer: impl AsRef<[u8]>) -> anyhow::Result<()> {
     let mut stdout = std::io::stdout().lock();
-    match stdout.write_all(answer.as_bytes()).and_then(|()| stdout.flush()) {
+    match stdout.write_all(answer.as_ref()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
             Err(error).context("standard output")
         }

@@ -9,14 +9,14 @@ use evtach_host::measure::{FileFacts, measure_events, summarise};
 use evtach_host::report::{Subject, heat_map, html};
 
 use super::how::How;
-use super::{in_order, keep_apart, say};
+use super::{deliver, in_order, keep_apart};
 
 /// Arguments of `evtach plot`.
 #[derive(clap::Args)]
 pub struct Args {
     /// Recording; "-" reads stdin.
     file: PathBuf,
-    /// Report to write [default: the recording's name with .html]; a name in .svg gets the heat map alone.
+    /// Report to write [default: the recording's name with .html], "-" for stdout; a name in .svg gets the heat map alone.
     #[arg(short, long, value_name = "HTML|SVG")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -80,9 +80,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let alone = out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("svg"));
     let drawn = if alone { heat_map(&subject)? } else { html(&subject)? };
-    std::fs::write(&out, drawn)
-        .with_context(|| format!("{}: cannot be written; choose --out", out.display()))?;
-    say(&format!("{}\n", out.display()))?;
+    deliver(&out, drawn.as_bytes(), &out.display().to_string())?;
     let spoken = summary.rotors.iter().any(|rotor| rotor.speed.is_some());
     Ok(ExitCode::from(u8::from(!spoken)))
 }

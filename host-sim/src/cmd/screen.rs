@@ -10,18 +10,19 @@ use evtach_host::frame::Frame;
 use evtach_host::play::play;
 use evtach_host::recording;
 
+use super::span::parse_seconds;
 use super::stated::Stated;
-use super::{in_order, keep_apart, say};
+use super::{deliver, in_order, keep_apart};
 
 /// Arguments of `evtach screen`.
 #[derive(clap::Args)]
 pub struct Args {
     /// Recording; "-" reads stdin.
     file: PathBuf,
-    /// Picture to write, PNG of 480x272 pixels.
+    /// Picture to write, PNG of 480x272 pixels; "-" for stdout.
     out: PathBuf,
     /// The screen at this many seconds after the first event [default: at the end].
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     at: Option<f64>,
     /// What fills the screen.
     #[arg(long, value_enum, default_value = "main")]
@@ -102,7 +103,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         eprintln!("{name}: {assumed}");
     }
     let mut instrument = Instrument::new(args.preferences());
-    let until_us = args.at.map(|seconds| (seconds.max(0.0) * 1e6) as u64);
+    let until_us = args.at.map(|seconds| (seconds * 1e6) as u64);
     play(&mut recording, &mut instrument, until_us).with_context(|| name.clone())?;
     in_order(&recording, &name)?;
     for action in args.actions() {
@@ -110,12 +111,12 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     let mut frame = Frame::default();
     let Ok(()) = Screen::new().draw(&mut frame, &instrument);
-    frame.write_png(&args.out)?;
     let view = instrument.view();
     let shown = view.speed.map_or_else(
         || view.state.advice().to_owned(),
         |speed| format!("{} ± {} {}", speed.value, speed.error, view.preferences.unit.as_str()),
     );
-    say(&format!("{}: {} {}\n", args.out.display(), view.state.word(), shown))?;
+    let said = format!("{}: {} {shown}", args.out.display(), view.state.word());
+    deliver(&args.out, &frame.png()?, &said)?;
     Ok(ExitCode::from(u8::from(view.speed.is_none())))
 }

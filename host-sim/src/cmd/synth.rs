@@ -72,7 +72,7 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scene = scene(args)?;
     if args.print_scene {
-        say(&format!("{}\n", serde_json::to_string_pretty(&scene)?))?;
+        say(format!("{}\n", serde_json::to_string_pretty(&scene)?))?;
         return Ok(ExitCode::SUCCESS);
     }
     let Some(format) = args.format.or_else(|| WriteFormat::from_path(&args.out)) else {

@@ -268,6 +268,8 @@ fn bad_usage() {
         vec!["measure", "--blades", "0", &good],
         vec!["measure", "--window-ms", "1", &good],
         vec!["measure", "--no-such-flag", &good],
+        vec!["measure", "--start", "nan", &good],
+        vec!["convert", "--end", "inf", &good, "-"],
         vec!["no-such-command"],
     ] {
         let run = evtach(&args, b"");

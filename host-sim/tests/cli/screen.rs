@@ -1,6 +1,7 @@
 //! `evtach screen` and `evtach watch`, as far as they go without a terminal.
 
 use std::path::Path;
+use std::process::Command;
 
 use evtach_host::frame::Frame;
 use tempfile::TempDir;
@@ -38,6 +39,26 @@ fn the_demos_screen_shows_its_speed_in_the_unit_asked_for() {
     assert!((speed_in(&said) - 1180.0 / 60.0).abs() < 0.025, "{said}");
     assert!(said.contains(" Hz"), "{said}");
     assert!(rpm != hertz);
+}
+
+/// A picture and a report go to stdout as to a file, and what is said of them to stderr.
+#[test]
+fn a_picture_and_a_report_may_go_to_a_pipe() {
+    let folder = TempDir::new().expect("a folder");
+    let demo = demo();
+    let path = folder.path().join("out").display().to_string();
+    let run = |args: [&str; 4]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_evtach")).args(args).output();
+        output.expect("evtach starts")
+    };
+    for command in [["screen", &demo, "--mode=live"], ["plot", &demo, "--out"]] {
+        let to = |place| run([command[0], command[1], command[2], place]);
+        let (to_file, to_pipe) = (to(&path), to("-"));
+        assert!(to_file.status.success() && to_pipe.status.success(), "{command:?}");
+        assert!(to_pipe.stdout == std::fs::read(&path).expect("the file"), "{command:?}");
+        let said = String::from_utf8(to_pipe.stderr).expect("text");
+        assert!(said.lines().any(|line| line.starts_with('-')), "{said}");
+    }
 }
 
 #[test]
