@@ -123,14 +123,14 @@ step_fuzz() {
   done
 }
 
-# Building cargo-deny takes two and a half minutes on two cores: done where CI is set, left to people.
+# Building cargo-deny takes minutes: done where CI is set, left to people.
 step_deny() {
   if ! command -v cargo-deny >/dev/null; then
     if [ -z "${CI:-}" ]; then
       echo "skipped: no cargo-deny (cargo install cargo-deny --locked)"
       return
     fi
-    cargo install cargo-deny --locked --quiet
+    cargo install cargo-deny --locked --quiet --debug
   fi
   cargo deny check bans licenses sources
   # The emulated board has its own rules: its processor is GPL-2.0.

@@ -1,5 +1,7 @@
 //! Helpers shared by the tests that cross crates.
 
+pub mod visa;
+
 use std::env;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};

@@ -1,8 +1,5 @@
 //! The device and the PC give the same readings for the same events, to the last bit.
 
-#[path = "compare.rs"]
-mod compare;
-
 use std::env;
 use std::path::{Path, PathBuf};
 
@@ -11,6 +8,8 @@ use evtach_host::device::{self, CallCost, INSTRUCTIONS_PER_TICK, MOST_IN_STEP, P
 use evtach_host::recording::{self, OpenOptions};
 use evtach_host::synth::scene::Lamp;
 use evtach_host::synth::{self, Rotor, Scene};
+
+use super::compare;
 
 /// Plays events to the device and compares; `None` without QEMU.
 fn compare(name: &str, geometry: Geometry, events: &[Event]) -> Option<Vec<Reading>> {

@@ -1,9 +1,5 @@
 //! The instrument in QEMU: what a person sees on its screen and reads over its serial port, also when it fails.
 
-#[path = "compare.rs"]
-#[expect(dead_code, reason = "shared with other tests")]
-mod compare;
-
 use std::time::{Duration, Instant};
 
 use embedded_graphics::pixelcolor::IntoStorage as _;
@@ -19,6 +15,8 @@ use evtach_host::frame::Frame;
 use evtach_host::measure::{Capacity, with_tachometer};
 use evtach_host::synth::{self, Rotor, Scene};
 use evtach_tests::{Loaded, load};
+
+use super::compare;
 
 fn stream(Loaded { geometry, events }: &Loaded) -> Vec<u8> {
     let mut bridge = Bridge::new(Kind::Evt2, *geometry, "bridge");

@@ -1,15 +1,14 @@
 //! Events that come to the device through its SPI controller are those that went out on the other side: the same
 //! readings as on the PC, to the last bit, and no event unaccounted for.
 
-#[path = "compare.rs"]
-mod compare;
-
 use evtach_core::{Event, Geometry, Polarity};
 use evtach_firmware::sensor::spi::{Bridge, Kind};
 use evtach_host::device::{self, Acquired, Output, Pace};
 use evtach_host::synth::scene::Lamp;
 use evtach_host::synth::{self, Rotor, Scene};
 use evtach_tests::{Loaded, load, recordings};
+
+use super::compare;
 
 /// The frames in which a bridge sends events.
 fn frames(kind: Kind, geometry: Geometry, events: &[Event]) -> Vec<Vec<u8>> {

@@ -1,12 +1,10 @@
 //! Odd, cut and broken files: what is good in them is delivered, and what is wrong is told with its place.
 
-#[path = "scratch.rs"]
-mod scratch;
-
 use evtach_core::{Event, Geometry};
 use evtach_host::recording::write::{self, WriteFormat};
 use evtach_host::recording::{self, OpenOptions};
-use scratch::{Read, Scratch, event, read, read_bytes};
+
+use crate::scratch::{Read, Scratch, event, read, read_bytes};
 
 const SIZE: Geometry = Geometry { width_px: 640, height_px: 480 };
 

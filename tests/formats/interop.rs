@@ -2,10 +2,6 @@
 //!
 //! The peers come from PyPI into a virtual environment that `tests/interop/setup.sh` makes.
 
-#[path = "scratch.rs"]
-#[expect(dead_code, reason = "shared with other tests")]
-mod scratch;
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
@@ -13,7 +9,8 @@ use std::sync::OnceLock;
 use evtach_core::{Event, Geometry};
 use evtach_host::recording::ImuSample;
 use evtach_host::recording::write::{self, WriteFormat};
-use scratch::{Scratch, event, read};
+
+use crate::scratch::{Scratch, event, read};
 
 const SIZE: Geometry = Geometry { width_px: 320, height_px: 240 };
 

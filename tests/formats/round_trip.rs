@@ -1,14 +1,11 @@
 //! What is written is read back: every event, in order, through every format that is written.
 
-#[path = "scratch.rs"]
-#[expect(dead_code, reason = "shared with other tests")]
-mod scratch;
-
 use evtach_core::{Event, Geometry, GyroSample};
 use evtach_host::recording::write::{self, WriteFormat};
 use evtach_host::recording::{self, ImuSample, OpenOptions};
 use proptest::prelude::*;
-use scratch::{Scratch, event, read};
+
+use crate::scratch::{Scratch, event, read};
 
 const GEOMETRY: Geometry = Geometry { width_px: 1280, height_px: 720 };
 

@@ -2,28 +2,23 @@
 //!
 //! The device is the firmware's own link, recorder and core, on the PC; its light is made up.
 
-#[path = "bench.rs"]
-#[expect(dead_code, reason = "shared with other tests")]
-mod bench;
-#[path = "visa.rs"]
-mod visa;
-
 use std::fs::File;
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpListener;
 use std::process::Child;
 use std::time::{Duration, Instant};
 
-use bench::Bench;
 use evtach_core::{Event, Geometry, Reading, Settings};
 use evtach_firmware::instrument::Sensor;
 use evtach_firmware::scpi::Link;
 use evtach_host::measure::{Capacity, measure_events};
 use evtach_host::synth::{self, Rotor, Scene};
+use evtach_tests::visa::{check, out, python, session};
 use rustix::fs::{OFlags, fcntl_setfl};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
-use visa::{check, out, python, session};
+
+use crate::bench::Bench;
 
 /// Longest session that is not taken for a hang.
 const PATIENCE: Duration = Duration::from_secs(60);

@@ -4,7 +4,7 @@ use evtach_firmware::instrument::{Instrument, Preferences};
 use evtach_firmware::ui::Screen;
 use evtach_host::frame::Frame;
 
-use crate::board::Board;
+use super::rig::Board;
 
 /// The screen as the PC draws it.
 pub fn drawn(instrument: &Instrument) -> Frame {
@@ -38,18 +38,18 @@ fn boots_draws_and_answers() {
     assert_eq!(board.query("FETC:REAS?"), "\"no_sensor\"");
     let lcd = board.lcd();
     let mut instrument = Instrument::new(Preferences::default());
-    instrument.show_picture(&crate::walk::empty_picture());
+    instrument.show_picture(&super::walk::empty_picture());
     assert_eq!(differing(&lcd, &drawn(&instrument)), 0, "pixels that differ from the PC's");
     board.assert_sound();
 }
 
 #[test]
 fn ten_runs_are_one() {
-    let (mut first, sees) = (None, crate::one_rotor(1500.0, 200.0));
+    let (mut first, sees) = (None, super::one_rotor(1500.0, 200.0));
     for _ in 0..10 {
         let Some(mut board) = Board::switch_on() else { return };
         board.run(0.3);
-        board.plug_camera(crate::board::Camera::Davis346, &sees);
+        board.plug_camera(super::rig::Camera::Davis346, &sees);
         board.run(1.0);
         let this = (board.report().to_string(), board.defmt_log(), board.lcd());
         let first = first.get_or_insert_with(|| this.clone());

@@ -8,9 +8,9 @@ use evtach_host::measure::{Capacity, ReadingRow, drain, measure_events, with_tac
 use evtach_host::synth::{Rotor, Scene};
 use evtach_tests::{Loaded, load, recordings, show};
 
-use crate::board::{Board, Camera};
-use crate::boot::{differing, drawn};
-use crate::{DAVIS346, DVXPLORER, from_zero, one_rotor, synthesise};
+use super::boot::{differing, drawn};
+use super::rig::{Board, Camera};
+use super::{DAVIS346, DVXPLORER, from_zero, one_rotor, synthesise};
 
 /// Seconds that a first reading may take.
 const PATIENCE_S: f64 = 8.0;

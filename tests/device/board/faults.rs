@@ -6,9 +6,9 @@ use evtach_firmware::instrument::{Fault, Instrument, Preferences, Sensor};
 use evtach_firmware::sensor::usb::Trouble;
 use evtach_tests::Loaded;
 
-use crate::board::{Board, Camera, Unplug};
-use crate::boot::{differing, drawn};
-use crate::{DAVIS346, one_rotor};
+use super::boot::{differing, drawn};
+use super::rig::{Board, Camera, Unplug};
+use super::{DAVIS346, one_rotor};
 
 const SENSOR: &str = "SYST:SENS?";
 
@@ -100,7 +100,7 @@ fn another_device_is_refused_by_name() {
     board.run(0.5);
     let mut instrument = Instrument::new(Preferences::default());
     instrument.set_trouble(Some(Trouble::Foreign { vendor_id: 0x0781, product_id: 0x5567 }));
-    instrument.show_picture(&crate::walk::empty_picture());
+    instrument.show_picture(&super::walk::empty_picture());
     assert_eq!(differing(&board.lcd(), &drawn(&instrument)), 0, "pixels that differ from the PC's");
     board.unplug(Unplug::Plain);
     board.wait_for(2.0, SENSOR, |answer| answer.starts_with("\"absent\""));
@@ -120,7 +120,7 @@ fn shown_after_the_reset(crash: &str, seconds: f64, fault: Fault, name: &str) {
     assert!(said.starts_with(&format!("\"{name}\"")), "{said}");
     let mut instrument = Instrument::new(Preferences::default());
     instrument.fail(fault);
-    instrument.show_picture(&crate::walk::empty_picture());
+    instrument.show_picture(&super::walk::empty_picture());
     assert_eq!(differing(&board.lcd(), &drawn(&instrument)), 0, "pixels that differ from the PC's");
     board.query("SYST:FAULT:CLE;*OPC?");
     assert_eq!(board.query("FETC:REAS?"), "\"no_sensor\"");
@@ -240,7 +240,7 @@ fn a_camera_that_sees_nothing_for_a_minute_starves_nobody() {
     assert!(per_s < 21_600_000, "{per_s} instructions a second");
     let mut instrument = Instrument::new(Preferences::default());
     instrument.set_sensor(Sensor::Present);
-    instrument.show_picture(&crate::walk::empty_picture());
+    instrument.show_picture(&super::walk::empty_picture());
     assert_eq!(differing(&board.lcd(), &drawn(&instrument)), 0, "pixels that differ from the PC's");
     board.assert_sound();
 }

@@ -3,8 +3,8 @@
 use evtach_host::measure::ReadingRow;
 use evtach_host::synth::{Model, Rotor, Scene};
 
-use crate::board::{Board, Camera};
-use crate::synthesise;
+use super::rig::{Board, Camera};
+use super::synthesise;
 
 /// Time after which the recording comes again.
 const PERIOD_S: f64 = 0.96;

@@ -4,8 +4,8 @@ use evtach_host::synth::{Model, Rotor, Scene};
 use evtach_tests::{Loaded, show};
 use serde_json::Value;
 
-use crate::board::{Board, Camera};
-use crate::synthesise;
+use super::rig::{Board, Camera};
+use super::synthesise;
 
 /// Seconds of the minute.
 const SECONDS: u32 = 60;

@@ -2,8 +2,8 @@
 
 use evtach_firmware::sensor::spi::{Bridge, Kind};
 
-use crate::board::Board;
-use crate::one_rotor;
+use super::one_rotor;
+use super::rig::Board;
 
 /// Where the recording begins in the flash.
 const REPLAY: u32 = 1 << 20;

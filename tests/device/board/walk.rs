@@ -9,8 +9,8 @@ use evtach_firmware::instrument::{Action, Instrument, Page, Picture, Preferences
 use evtach_firmware::ui::{Press, action_at, button};
 use evtach_host::frame::Frame;
 
-use crate::board::Board;
-use crate::boot::{differing, drawn};
+use super::boot::{differing, drawn};
+use super::rig::Board;
 
 /// The sensor that the measurement is set up for until it knows better.
 const BEFORE: Geometry = Geometry { width_px: 320, height_px: 320 };

@@ -4,8 +4,8 @@ use evtach_core::{Frame, Reading, Reason, RotorReading, Speed, Status};
 use evtach_firmware::scpi::LogLine;
 use proptest::prelude::*;
 
+use super::{Session, reading, rotor};
 use crate::bench::drain;
-use crate::{Session, reading, rotor};
 
 #[test]
 fn the_log_tells_each_reading_once_between_answers() {

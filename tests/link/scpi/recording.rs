@@ -3,7 +3,7 @@
 use evtach_core::{Event, Geometry, Polarity};
 use evtach_firmware::record::{Decoder, Header};
 
-use crate::Session;
+use super::Session;
 use crate::bench::{Bench, drain, exchange};
 
 fn events(count: u64) -> Vec<Event> {

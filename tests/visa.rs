@@ -3,11 +3,18 @@
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
+use evtach_core::Direction;
+use evtach_host::measure::Capacity;
+use evtach_host::recording::{self, OpenOptions};
+
+use crate::{load, measure};
+
 fn interop() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("interop")
 }
 
 /// Python with PyVISA, or `None` where it cannot be had.
+#[must_use]
 pub fn python() -> Option<String> {
     let output = Command::new("bash").arg(interop().join("setup.sh")).arg("visa").output();
     match output {
@@ -26,6 +33,10 @@ pub fn python() -> Option<String> {
 }
 
 /// Starts the session; what it prints is one JSON object.
+///
+/// # Panics
+/// Where Python does not start.
+#[must_use]
 pub fn session(python: &str, port: &str, out: &Path) -> Child {
     Command::new(python)
         .arg(interop().join("pyvisa_session.py"))
@@ -37,7 +48,11 @@ pub fn session(python: &str, port: &str, out: &Path) -> Child {
         .expect("the virtual environment's Python runs")
 }
 
-/// Checks what a session printed, from a device of this version, and that `evtach measure` reads the recording it saved.
+/// Checks what a session printed, from a device of this version, and that the recording it saved is read as
+/// `evtach measure` reads it.
+///
+/// # Panics
+/// Where it is not so: the test fails.
 pub fn check(client: Child, out: &Path, version: &str) {
     let output = client.wait_with_output().expect("a child");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -54,22 +69,18 @@ pub fn check(client: Child, out: &Path, version: &str) {
     assert!(found["log"]["rotors"][0]["rpm"].is_number(), "{found}");
     assert_eq!(found["after"], "1");
 
-    let measured = Command::new(env!("CARGO"))
-        .args(["run", "--quiet", "--package", "evtach-host", "--", "measure", "--json"])
-        .args(["--capacity", "device"])
-        .arg(out)
-        .output()
-        .expect("cargo runs");
-    let told = String::from_utf8_lossy(&measured.stderr);
-    assert!(measured.status.success(), "evtach measure: {told}");
-    let read: serde_json::Value = serde_json::from_slice(&measured.stdout).expect("JSON");
-    assert_eq!((&read["format"], &read["events"]), (&"EV8".into(), &100_000.into()), "{told}");
-    let rotor = &read["rotors"][0];
-    assert!((rotor["rpm"].as_f64().expect("a speed") / 1500.0 - 1.0).abs() < 0.01, "{read}");
-    assert_eq!(rotor["direction"], "ccw");
+    let recording = recording::open(out, &OpenOptions::default()).expect("a recording");
+    assert_eq!(recording.format, "EV8");
+    let recorded = load(out).expect("no damage");
+    assert_eq!(recorded.events.len(), 100_000);
+    let (_, summary) = measure(&recorded, Capacity::Device);
+    let speed = summary.rotors.first().and_then(|rotor| rotor.speed).expect("a speed");
+    assert!((f64::from(speed.rpm()) / 1500.0 - 1.0).abs() < 0.01, "{speed:?}");
+    assert_eq!(speed.direction(), Direction::Ccw);
 }
 
 /// Where a session's recording goes.
+#[must_use]
 pub fn out(name: &str) -> PathBuf {
     std::env::temp_dir().join(format!("evtach-{name}-{}.ev8", std::process::id()))
 }

@@ -1,17 +1,16 @@
 //! SCPI as a person types it: what is answered, what is refused, and that nothing hangs.
 
-#[path = "../bench.rs"]
-mod bench;
 mod log;
 mod recording;
 
-use bench::{Bench, drain, exchange};
 use evtach_core::{Evidence, Frame, Reading, Reason, RotorReading, Speed, Status};
 use evtach_firmware::instrument::{Fault, Sensor, Unit};
 use evtach_firmware::scpi::{ErrorCode, LINE_BYTES, Link, READING_TIMEOUT_US, Statistics};
 use evtach_firmware::sensor::usb::Trouble;
 use proptest::prelude::*;
 use recording::block;
+
+use crate::bench::{Bench, drain, exchange};
 
 fn rotor(id: u8, rpm: f32) -> RotorReading {
     RotorReading {

@@ -9,7 +9,8 @@ use evtach_host::synth::presets::{Preset, hand, shaken, wall};
 use evtach_host::synth::scene::{Background, Camera, Lamp, Sensor, Shape, Vibration};
 use evtach_host::synth::{Model, Rotor, Scene, generate};
 use evtach_tests::{Loaded, measure, show};
-use measured::{all_read, at, rpm, run, scene, wide};
+
+use self::measured::{all_read, at, rpm, run, scene, wide};
 
 #[test]
 fn a_busy_background_from_the_hand() {

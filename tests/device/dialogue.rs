@@ -1,20 +1,17 @@
 //! Stock PyVISA at the instrument's emulated serial port, while events come over its emulated SPI bus.
 
-#[path = "compare.rs"]
-#[expect(dead_code, reason = "shared with other tests")]
-mod compare;
-#[path = "../link/visa.rs"]
-mod visa;
-
 use std::time::{Duration, Instant};
 
 use evtach_core::Geometry;
 use evtach_firmware::sensor::spi::{Bridge, Kind};
 use evtach_host::device::{self, Plugged};
 use evtach_host::synth::{self, Rotor, Scene};
+use evtach_tests::visa;
+
+use super::compare;
 
 /// Longest session that is not taken for a hang.
-const PATIENCE: Duration = Duration::from_secs(120);
+const PATIENCE: Duration = Duration::from_secs(300);
 
 /// Few events a second, so that the flash that stands in for the bridge holds the whole session.
 fn stream() -> Vec<u8> {

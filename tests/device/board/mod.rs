@@ -1,12 +1,12 @@
 //! The image that a user flashes, on an emulated STM32F746G-DISCO: each test reads like a person using the device.
 
-mod board;
 mod boot;
 mod camera;
 mod faults;
 mod flood;
 mod minute;
 mod replay;
+mod rig;
 mod walk;
 
 use evtach_core::{Event, Geometry};

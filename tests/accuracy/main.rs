@@ -1,0 +1,12 @@
+//! Speeds against their truth, and refusals where there is none to tell.
+
+mod bound;
+mod contrast;
+mod gyro;
+mod lapses;
+mod layouts;
+mod mistaken;
+mod recordings;
+mod series;
+mod settling;
+mod synthetic;
