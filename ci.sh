@@ -4,7 +4,7 @@
 #   ./ci.sh            all steps, in this order: install format lint test bench board docs image budget fuzz deny
 #   ./ci.sh STEP...    only these
 #
-# Less than an hour on two cores from nothing; half of it is compiling.
+# Some 40 minutes on two cores from nothing; half of it is compiling.
 set -euo pipefail
 cd "$(dirname "$0")"
 
@@ -68,10 +68,15 @@ step_test() {
   cargo test --workspace
 }
 
-# A minute of the accuracy tables: both fail where a reading is more than 1 % off or told where no rotor is.
+# As the tests are compiled: overflow is looked for, and what they have compiled is at hand.
+evtach() {
+  cargo run --quiet -p evtach-host --bin evtach -- "$@"
+}
+
+# A few minutes of the accuracy tables: both fail where a reading is more than 1 % off or told where no rotor is.
 step_bench() {
-  cargo run --release -p evtach-host --bin evtach -- bench blind --quick
-  cargo run --release -p evtach-host --bin evtach -- bench trust --quick
+  evtach bench blind --quick
+  evtach bench trust --quick
 }
 
 # The emulated STM32F746G-DISCO itself, which is a workspace of its own; `test` runs the device's image on it.
@@ -103,8 +108,8 @@ step_budget() {
     echo "skipped: no qemu-system-arm"
     return
   fi
-  cargo run --release -p evtach-host --bin evtach -- bench cost
-  cargo run --release -p evtach-host --bin evtach -- bench budget
+  evtach bench cost
+  evtach bench budget
 }
 
 # A smoke run over the seeds, without cargo-fuzz and its instrumentation; fuzz/run.sh is the real thing.
@@ -113,7 +118,8 @@ step_fuzz() {
     echo "skipped: no nightly toolchain"
     return
   fi
-  (cd fuzz && cargo build --release)
+  # What runs for two seconds each need not be fast.
+  (cd fuzz && CARGO_PROFILE_RELEASE_OPT_LEVEL=1 cargo build --release)
   local found
   found=$(mktemp -d)
   for seeds in fuzz/seeds/*/; do
