@@ -127,6 +127,33 @@ fn scenes_without_rotors() {
     assert!(failures.is_empty(), "\n{}", failures.join("\n"));
 }
 
+/// Of small rotors that are looked at from aside, jitter blurs the edges by more than doubt of their harmonic leaves room for. Their
+/// events are read by nothing else either: two thirds of a speed was once told instead.
+#[test]
+fn small_fast_and_tilted() {
+    let rotors = [
+        (19_645.74, 24.0, 41.41, 169.4),
+        (-16_700.0, 22.0, 49.0, 100.0),
+        (30_900.0, 27.0, 45.0, 30.0),
+        (-38_100.0, 30.0, 43.0, 75.0),
+        (13_600.0, 38.0, 40.0, 140.0),
+    ];
+    let mut failures = Vec::new();
+    for (seed, (rpm, radius_px, tilt_deg, tilt_axis_deg)) in rotors.into_iter().enumerate() {
+        for model in [Model::Threshold, Model::Edge] {
+            let rotor = Rotor { rpm, radius_px, tilt_deg, tilt_axis_deg, ..Rotor::default() };
+            let scene = one(rotor, model, 60 + seed as u64);
+            let name = format!("{model:?}, {radius_px} px");
+            failures.extend(wrong(&name, &scene));
+            let off = errors(&scene);
+            if off.is_empty() || off.iter().any(|off| off.abs() > LARGEST_ERROR) {
+                failures.push(format!("{name}, {rpm:+.1} rpm, full memory: off by {off:?}"));
+            }
+        }
+    }
+    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
+}
+
 /// Sense of rotation of [`arms`].
 #[derive(Clone, Copy)]
 enum Turn {
@@ -283,7 +310,7 @@ fn too_slow_for_the_longest_window() {
 /// Relative errors of the readings of one three-bladed rotor in the middle of a scene.
 fn errors(scene: &Scene) -> Vec<f64> {
     let made = generate(scene).expect("a scene in range");
-    let expected = Truth::from(&made.truth.rotors[0]).rpm_camera;
+    let expected = Truth::from(&made.truth.rotors[0]).rpm_camera.abs();
     let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
     let (readings, _) = measure(&Loaded { geometry, events: made.events }, Capacity::Full);
     let off = |reading: &Reading| {

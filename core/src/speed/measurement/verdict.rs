@@ -22,8 +22,9 @@ const MOST_BLUR: (f32, f32) = (0.1, 1.5);
 const LEAST_BLUR: (f32, f32) = (0.06, 1.3);
 /// Blur, noise and all, beyond which they are none where another harmonic keeps step.
 const MOST_RIVALLED_BLUR: (f32, f32) = (0.11, 1.65);
-/// Standard deviation of the events' times in dim light.
+/// Standard deviation of the events' times in dim light, and in bright light.
 const MOST_JITTER_S: f32 = 200e-6;
+const LEAST_JITTER_S: f32 = 40e-6;
 /// Scatter of a phase by that jitter beyond which a registration is not believed where it contradicts.
 const MOST_SCATTER_RAD: f32 = 0.8;
 /// The same beyond which it leaves no edge: half an octave past the harmonic that it shows best.
@@ -278,8 +279,8 @@ impl Measurement {
     }
 
     /// Whether the rotor has edges: what merely keeps step with one frequency has none, and a wrong harmonic about a wrong
-    /// centre has no overtone. It blurs them, too: where another harmonic keeps step at all, noise is no excuse, nor is jitter where that of
-    /// a rotor that is not small is in doubt. Without polarity leading edges are matched with trailing ones, and what could not be
+    /// centre has no overtone. It blurs them, too: where another harmonic keeps step at all, noise is no excuse, nor is the jitter of
+    /// dim light where that of a rotor that is not small is in doubt. Without polarity leading edges are matched with trailing ones, and what could not be
     /// counted may be a winding more than there are blades: only sharp ones tell.
     pub(super) fn has_edges(&self, ignores_polarity: bool) -> bool {
         if self.in_doubt() {
@@ -287,16 +288,17 @@ impl Measurement {
         }
         let radius_px = self.disc.radius_px;
         let most_px = if !self.doubted() {
-            self.blur_px(MOST_RIVALLED_BLUR)
+            self.blur_px(MOST_RIVALLED_BLUR, MOST_JITTER_S)
         } else if ignores_polarity || self.parts.is_none() {
             share_px(LEAST_BLUR, radius_px)
         } else if radius_px >= SMALL_PX {
-            share_px(MOST_RIVALLED_BLUR, radius_px)
+            self.blur_px(MOST_RIVALLED_BLUR, LEAST_JITTER_S)
         } else {
-            self.blur_px(MOST_RIVALLED_BLUR)
+            self.blur_px(MOST_RIVALLED_BLUR, MOST_JITTER_S)
         };
         let sharp = !self.rivalled() || self.pose.sharpness_px() < most_px;
-        self.too_fast_for_edges() || self.edges_px() < self.blur_px(MOST_BLUR) && sharp
+        self.too_fast_for_edges()
+            || self.edges_px() < self.blur_px(MOST_BLUR, MOST_JITTER_S) && sharp
     }
 
     /// Whether so many events keep step as do at this speed, which was asked before, and no more is to be seen.
@@ -310,7 +312,7 @@ impl Measurement {
     /// astray, is no blur where no other harmonic keeps step.
     pub(super) fn sharp(&self) -> bool {
         let blur_px = if self.doubted() { self.pose.sharpness_px() } else { self.edges_px() };
-        self.too_fast_for_edges() || blur_px < self.blur_px(LEAST_BLUR)
+        self.too_fast_for_edges() || blur_px < self.blur_px(LEAST_BLUR, MOST_JITTER_S)
     }
 
     /// How sharp the edges are. A single mark is told from its axis's shaking by its sharpness alone, so noise counts against it.
@@ -322,9 +324,9 @@ impl Measurement {
 
     // Not inlined: it is called in several places.
     #[inline(never)]
-    fn blur_px(&self, most: (f32, f32)) -> f32 {
+    fn blur_px(&self, most: (f32, f32), jitter_s: f32) -> f32 {
         let radius_px = self.disc.radius_px;
-        let jitter_px = 0.5 * radius_px * self.omega_rad_s.abs() * MOST_JITTER_S;
+        let jitter_px = 0.5 * radius_px * self.omega_rad_s.abs() * jitter_s;
         share_px(most, radius_px) + BLUR_OF_JITTER * jitter_px
     }
 
