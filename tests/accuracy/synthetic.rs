@@ -347,6 +347,27 @@ fn every_reading_of_a_series_from_the_hand() {
     assert!(failures.is_empty(), "\n{}", failures.join("\n"));
 }
 
+/// A neighbour of the right harmonic keeps step almost as well with many small blades in a hand, about a place a few pixels off, but its
+/// overtone is no sharp one.
+#[test]
+fn a_sharp_overtone_settles_which_harmonic_it_is() {
+    let scenes = [
+        (Model::Edge, 6, 8, 26.0, -700.0, Shape::Straight),
+        (Model::Threshold, 7, 6, 20.0, -700.0, Shape::Tapered),
+        (Model::Threshold, 3, 6, 18.0, -900.0, Shape::Straight),
+        (Model::Edge, 3, 8, 26.0, 600.0, Shape::Swept),
+    ];
+    for (model, seed, blades, radius_px, rpm, shape) in scenes {
+        let rotor = Rotor { blades, rpm, radius_px, shape, ..Rotor::default() };
+        let camera = Camera { tremor_mrad: 0.0, ..presets::hand() };
+        let off = errors(&Scene { camera, duration_ms: 420.0, ..one(rotor, model, seed) });
+        let name = format!("{blades} blades, {radius_px} px, {} readings", off.len());
+        show(&format!("{name}, off by {off:.5?}"));
+        assert!(off.len() >= 5, "{name}");
+        assert!(off.iter().all(|off| off.abs() < LARGEST_ERROR), "{name}: {off:?}");
+    }
+}
+
 /// Where each edge lies within its pixel, and each pixel's threshold, come again with every blade and must cancel: what is left is
 /// near what the events' jitter of 40 us leaves of 150 ms, 2.1 and 1.6 ppm.
 #[test]
