@@ -22,6 +22,9 @@ const MOST_BLUR: (f32, f32) = (0.1, 1.5);
 const LEAST_BLUR: (f32, f32) = (0.06, 1.3);
 /// Blur, noise and all, beyond which they are none where another harmonic keeps step.
 const MOST_RIVALLED_BLUR: (f32, f32) = (0.11, 1.65);
+/// The same in windings, of what could not be counted and is in doubt: of wheels of nine to sixteen parts in a hand, small ones, wrong
+/// harmonics had 0.55 to 0.9.
+const MOST_UNCOUNTED_BLUR: f32 = 0.5;
 /// Standard deviation of the events' times in dim light, and in bright light.
 const MOST_JITTER_S: f32 = 200e-6;
 const LEAST_JITTER_S: f32 = 40e-6;
@@ -130,7 +133,9 @@ impl Measurement {
                 < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
             let long = self.wanted_us <= 1.02 * window.duration_us as f32;
             let denied = self.registers() && self.refinement_denies(phase.omega_rad_s);
-            if denied || !self.bears_out(lock, Some(phase)) {
+            // A neighbour of the right harmonic, too, is borne out by few turns; the next window shows more.
+            let early = !long && self.doubted() && !self.pose.has_overtone();
+            if denied || early || !self.bears_out(lock, Some(phase)) {
                 self.status = Status::Refused(Reason::Ambiguous);
             } else if sharp && long {
                 self.estimate = combine(witness, phase, USUAL_SIGMAS);
@@ -289,8 +294,10 @@ impl Measurement {
         let radius_px = self.disc.radius_px;
         let most_px = if !self.doubted() {
             self.blur_px(MOST_RIVALLED_BLUR, MOST_JITTER_S)
-        } else if ignores_polarity || self.parts.is_none() {
+        } else if ignores_polarity {
             share_px(LEAST_BLUR, radius_px)
+        } else if self.parts.is_none() {
+            share_px(LEAST_BLUR, radius_px).min(MOST_UNCOUNTED_BLUR * self.winding_px())
         } else if radius_px >= SMALL_PX {
             self.blur_px(MOST_RIVALLED_BLUR, LEAST_JITTER_S)
         } else {
