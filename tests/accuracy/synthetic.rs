@@ -307,7 +307,7 @@ fn too_slow_for_the_longest_window() {
     assert!(failures.is_empty(), "\n{}", failures.join("\n"));
 }
 
-/// Relative errors of the readings of one three-bladed rotor in the middle of a scene.
+/// Relative errors of the readings of one rotor in the middle of a scene, whatever its direction.
 fn errors(scene: &Scene) -> Vec<f64> {
     let made = generate(scene).expect("a scene in range");
     let expected = Truth::from(&made.truth.rotors[0]).rpm_camera.abs();

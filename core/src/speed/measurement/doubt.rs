@@ -183,11 +183,11 @@ impl Measurement {
     /// Whether another harmonic keeps step almost as well wherever the centre is thought to be, and no overtone settles it: only a sharp
     /// one does where a centre that is off by little leads from one to the next.
     pub(super) fn in_doubt(&self) -> bool {
-        let radius_px = self.disc.radius_px;
-        let settled = self.pose.has_overtone() && radius_px >= SMALL_PX;
-        if self.pose.has_overtone() && self.pose.sharpness_px() < SETTLED_BLUR * self.winding_px() {
+        let overtone = self.pose.has_overtone();
+        if overtone && self.pose.sharpness_px() < SETTLED_BLUR * self.winding_px() {
             return false;
         }
+        let settled = overtone && self.disc.radius_px >= SMALL_PX;
         let rivalled = |doubt: &Doubt| {
             (doubt.small || !settled) && doubt.rival_share > MOST_RIVAL * doubt.share
         };
@@ -210,7 +210,7 @@ impl Measurement {
         self.standing() > SMALL_DOUBTFUL
     }
 
-    /// From one blade to the next in the pixels of [`Pose::sharpness_px`](crate::speed::pose::Pose::sharpness_px), radians of the radius.
+    /// Radius over the harmonic in pixels: what is from one blade to the next half-way to the rim, over pi.
     pub(super) fn winding_px(&self) -> f32 {
         self.disc.radius_px / self.harmonic as f32
     }
