@@ -22,9 +22,9 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::Common;
-use super::drive::{Capacity, conclusive, readings};
+use super::drive::{Capacity, readings};
 use super::report::{Report, progress};
-use super::score::{Score, is_wrong, score};
+use super::score::{Score, Scores, is_wrong, score};
 use super::spec;
 
 /// Counts the changes of [`scenes`]: results of different scenes must not be mixed in one file.
@@ -85,7 +85,7 @@ struct Outcome {
     beyond_6: usize,
     /// Why the last reading gave no speed at all.
     reason: Option<String>,
-    /// The conclusive reading of each rotor.
+    /// The conclusive reading of each rotor: its own last one with a speed, else the last.
     rotors: Vec<Spoken>,
 }
 
@@ -231,9 +231,11 @@ fn outcome(
     let errors = told.clone().filter_map(|s| s.room);
     let off_sigmas = told.filter_map(|s| off_sigmas(s.room?, s.sigma));
     let wrong = errors.clone().filter(|e| is_wrong(*e)).count();
-    let last = conclusive(series).map(|reading| score(scene, motion, reading));
+    // As `measure` tells it: the last reading with this rotor's speed, whatever else that shows.
     let found = |number: usize| -> Score {
-        last.as_ref().and_then(|s| s.rotors.get(number).cloned().flatten()).unwrap_or_default()
+        let of_rotor = |s: &Scores| s.rotors.get(number).cloned().flatten();
+        let told = scored.iter().rev().filter_map(of_rotor).find(|s| s.room.is_some());
+        told.or_else(|| scored.last().and_then(of_rotor)).unwrap_or_default()
     };
     let spoken = owed.iter().enumerate().map(|(number, &owed)| {
         let s = found(number);
