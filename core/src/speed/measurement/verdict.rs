@@ -25,6 +25,9 @@ const MOST_RIVALLED_BLUR: (f32, f32) = (0.11, 1.65);
 /// The same in windings, of what could not be counted and is in doubt: of wheels of nine to sixteen parts in a hand, small ones, wrong
 /// harmonics had 0.49 to 0.9, nearly all more than 0.55.
 const MOST_UNCOUNTED_BLUR: f32 = 0.5;
+/// The same with which counted parts that have an overtone have edges, whatever share of the radius that is: of two blades, the same share
+/// is half as much of what is from one to the next as of four.
+const CLEAR_BLUR: f32 = 0.4;
 /// Standard deviation of the events' times in dim light, and in bright light.
 const MOST_JITTER_S: f32 = 200e-6;
 const LEAST_JITTER_S: f32 = 40e-6;
@@ -119,7 +122,9 @@ impl Measurement {
         let held_up = QUEUE_SIGMA * stretch(window, self.disc, passes);
         // What jitter leads astray says nothing, nor does what agrees with anything.
         let lock = lock.filter(|lock| {
-            !self.slips(*lock) && (self.registers() || self.bears_out(*lock, phase))
+            !self.is_vague(*lock)
+                && !self.slips(*lock)
+                && (self.registers() || self.bears_out(*lock, phase))
         });
         if let (Some(lock), Some(phase)) = (lock, phase) {
             // The phase follows all the events that the lock registers some of, and shows how the speed changed meanwhile, which the
@@ -205,6 +210,12 @@ impl Measurement {
         let parts = (self.pace().parts * self.uncounted()) as f32;
         let scatter_rad = lock.sigma_rad_s * self.lock_baseline_s * parts;
         scatter_rad > MOST_SLIP * TAU + self.scatter_rad()
+    }
+
+    /// Whether the lock of a single mark may be farther off than any reading may be. Then the phase stands alone, which takes what a hand
+    /// moves the axis by for the mark's own turn.
+    fn is_vague(&self, lock: Estimate) -> bool {
+        self.parts == Some(1) && lock.sigma_rad_s > MOST_ERROR * lock.omega_rad_s.abs()
     }
 
     /// Adds half of what the witnesses of the lock are apart where that is more than their own scatter explains: the truth may be with
@@ -305,6 +316,7 @@ impl Measurement {
         };
         let sharp = !self.rivalled() || self.pose.sharpness_px() < most_px;
         self.too_fast_for_edges()
+            || self.is_clear(ignores_polarity)
             || self.edges_px() < self.blur_px(MOST_BLUR, MOST_JITTER_S) && sharp
     }
 
@@ -320,6 +332,15 @@ impl Measurement {
     pub(super) fn sharp(&self) -> bool {
         let blur_px = if self.doubted() { self.pose.sharpness_px() } else { self.edges_px() };
         self.too_fast_for_edges() || blur_px < self.blur_px(LEAST_BLUR, MOST_JITTER_S)
+    }
+
+    /// Whether parts that were counted, not a single mark, show edges between one and the next, noise and all.
+    fn is_clear(&self, ignores_polarity: bool) -> bool {
+        self.parts.is_some_and(|parts| parts > 1)
+            && self.harmonic > 1
+            && !(ignores_polarity && self.doubted())
+            && self.pose.has_overtone()
+            && self.pose.sharpness_px() < CLEAR_BLUR * self.winding_px()
     }
 
     /// How sharp the edges are. A single mark is told from its axis's shaking by its sharpness alone, so noise counts against it.
