@@ -25,8 +25,8 @@ const MOST_RIVALLED_BLUR: (f32, f32) = (0.11, 1.65);
 /// The same in windings, of what could not be counted and is in doubt: of wheels of nine to sixteen parts in a hand, small ones, wrong
 /// harmonics had 0.49 to 0.9, nearly all more than 0.55.
 const MOST_UNCOUNTED_BLUR: f32 = 0.5;
-/// The same with which counted parts that have an overtone have edges, whatever share of the radius that is: of two blades, the same share
-/// is half as much of what is from one to the next as of four.
+/// The same below which parts that were counted and have an overtone have edges, however large a share of the radius that is: 0.1 of it
+/// is this for four blades, and half of this for two.
 const CLEAR_BLUR: f32 = 0.4;
 /// Standard deviation of the events' times in dim light, and in bright light.
 const MOST_JITTER_S: f32 = 200e-6;

@@ -231,7 +231,7 @@ fn outcome(
     let errors = told.clone().filter_map(|s| s.room);
     let off_sigmas = told.filter_map(|s| off_sigmas(s.room?, s.sigma));
     let wrong = errors.clone().filter(|e| is_wrong(*e)).count();
-    // As `measure` tells it: the last reading with this rotor's speed, whatever else that shows.
+    // The last reading with this rotor's own speed: one that refuses it while it tells another takes nothing back.
     let found = |number: usize| -> Score {
         let of_rotor = |s: &Scores| s.rotors.get(number).cloned().flatten();
         let told = scored.iter().rev().filter_map(of_rotor).find(|s| s.room.is_some());
