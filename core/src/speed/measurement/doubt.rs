@@ -183,11 +183,10 @@ impl Measurement {
     /// Whether another harmonic keeps step almost as well wherever the centre is thought to be, and no overtone settles it: only a sharp
     /// one does where a centre that is off by little leads from one to the next.
     pub(super) fn in_doubt(&self) -> bool {
-        let overtone = self.pose.has_overtone();
-        if overtone && self.pose.sharpness_px() < SETTLED_BLUR * self.winding_px() {
+        if self.has_overtone_within(SETTLED_BLUR) {
             return false;
         }
-        let settled = overtone && self.disc.radius_px >= SMALL_PX;
+        let settled = self.pose.has_overtone() && self.disc.radius_px >= SMALL_PX;
         let rivalled = |doubt: &Doubt| {
             (doubt.small || !settled) && doubt.rival_share > MOST_RIVAL * doubt.share
         };
@@ -208,6 +207,13 @@ impl Measurement {
     /// Whether another harmonic keeps step at all, so that the centre may be off.
     pub(super) fn rivalled(&self) -> bool {
         self.standing() > SMALL_DOUBTFUL
+    }
+
+    /// Whether there is an overtone, blurred by less than so many windings.
+    // Not inlined: it is called in two places.
+    #[inline(never)]
+    pub(super) fn has_overtone_within(&self, windings: f32) -> bool {
+        self.pose.has_overtone() && self.pose.sharpness_px() < windings * self.winding_px()
     }
 
     /// Radius over the harmonic in pixels: what is from one blade to the next half-way to the rim, over pi.

@@ -334,13 +334,19 @@ impl Measurement {
         self.too_fast_for_edges() || blur_px < self.blur_px(LEAST_BLUR, MOST_JITTER_S)
     }
 
-    /// Whether parts that were counted, not a single mark, show edges between one and the next, noise and all.
+    /// Whether parts that were counted show edges between one and the next, noise and all. A single mark has no next one, and two that
+    /// differ may be one.
     fn is_clear(&self, ignores_polarity: bool) -> bool {
         self.parts.is_some_and(|parts| parts > 1)
+            && !self.may_be_mark()
             && self.harmonic > 1
             && !(ignores_polarity && self.doubted())
-            && self.pose.has_overtone()
-            && self.pose.sharpness_px() < CLEAR_BLUR * self.winding_px()
+            && self.has_overtone_within(CLEAR_BLUR)
+    }
+
+    /// Whether the rotor may be a single mark: two parts that differ may be one.
+    fn may_be_mark(&self) -> bool {
+        self.parts == Some(1) || self.parts == Some(2) && !self.alike
     }
 
     /// How sharp the edges are. A single mark is told from its axis's shaking by its sharpness alone, so noise counts against it.
@@ -369,7 +375,7 @@ impl Measurement {
     // Not inlined: it is called in three places.
     #[inline(never)]
     fn widen_mark(&mut self, shake_px: f32) {
-        if self.parts == Some(1) || self.parts == Some(2) && !self.alike {
+        if self.may_be_mark() {
             let turn_rad = self.evidence.periods.unwrap_or(0.0) * TAU;
             let shake = shake_px / (self.disc.radius_px * turn_rad) * self.omega_rad_s;
             self.estimate.sigma_rad_s = root_sum_square(self.estimate.sigma_rad_s, shake);
