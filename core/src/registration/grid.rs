@@ -183,7 +183,8 @@ impl Grid {
         for (at, [x, y, t]) in (start..).zip(places) {
             let (dx, dy, dt) = (x - query[0], y - query[1], t - query[2]);
             let distance2 = dx * dx + dy * dy + dt * dt;
-            if distance2 < best.1 || distance2 == best.1 && self.precedes(at, best.0) {
+            // One comparison tells of nearly all that they are farther.
+            if distance2 <= best.1 && (distance2 < best.1 || self.precedes(at, best.0)) {
                 *best = (at, distance2);
             }
         }

@@ -128,7 +128,12 @@ impl<'a> Window<'a> {
     pub fn between(&self, from_us: i32, to_us: i32) -> impl Iterator<Item = StoredEvent> + use<'a> {
         let start_us = self.start_us;
         let parts = self.parts;
-        parts.into_iter().take(self.segments).flat_map(move |part| {
+        let holds = move |part: &&[StoredEvent]| match part {
+            [first, .., last] => first.since(start_us) < to_us && last.since(start_us) >= from_us,
+            _ => true,
+        };
+        // Most stretches lie within one segment: the others are not searched.
+        parts.into_iter().take(self.segments).filter(holds).flat_map(move |part| {
             let from = part.partition_point(|event| event.since(start_us) < from_us);
             let to = part.partition_point(|event| event.since(start_us) < to_us);
             part[from..to.max(from)].iter().copied()
