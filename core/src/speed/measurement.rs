@@ -3,6 +3,7 @@
 mod baselines;
 mod coarse;
 mod doubt;
+mod edges;
 mod recovery;
 mod verdict;
 

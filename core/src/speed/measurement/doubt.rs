@@ -209,18 +209,6 @@ impl Measurement {
         self.standing() > SMALL_DOUBTFUL
     }
 
-    /// Whether there is an overtone, blurred by less than so many windings.
-    // Not inlined: it is called in two places.
-    #[inline(never)]
-    pub(super) fn has_overtone_within(&self, windings: f32) -> bool {
-        self.pose.has_overtone() && self.pose.sharpness_px() < windings * self.winding_px()
-    }
-
-    /// Radius over the harmonic in pixels: what is from one blade to the next half-way to the rim, over pi.
-    pub(super) fn winding_px(&self) -> f32 {
-        self.disc.radius_px / self.harmonic as f32
-    }
-
     fn standing(&self) -> f32 {
         self.evidence.scan_standing.unwrap_or(0.0)
     }

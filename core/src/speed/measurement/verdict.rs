@@ -2,7 +2,6 @@
 
 use super::super::baseline::Estimate;
 use super::baselines::FRACTION;
-use super::doubt::SMALL_PX;
 use super::{ACCELERATION_SIGMAS, Measurement, Stated, TILTED_PARTS};
 use crate::math::{TAU, sqrt};
 use crate::reading::{Evidence, Reason, Status};
@@ -11,33 +10,6 @@ use crate::speed::statistics::root_sum_square;
 use crate::store::Window;
 use crate::tachometer::BASE_WINDOW_US;
 
-/// A rotor keeps at least this share of its events in step, if they have no jitter.
-const LEAST_COHERENCE: f32 = 0.2;
-/// One of fewer than so many times that is faint: unless it is read, nothing says that it turns.
-const FAINT: f32 = 1.5;
-/// Blur of the rotor's edges, as a share of its radius and in pixels for a small one, beyond which they are no edges;
-/// and within which they are so sharp that a registration that went astray does not count against them, nor a doubtful harmonic
-/// without polarity.
-const MOST_BLUR: (f32, f32) = (0.1, 1.5);
-const LEAST_BLUR: (f32, f32) = (0.06, 1.3);
-/// Blur, noise and all, beyond which they are none where another harmonic keeps step.
-const MOST_RIVALLED_BLUR: (f32, f32) = (0.11, 1.65);
-/// The same in windings, of what could not be counted and is in doubt: of wheels of nine to sixteen parts in a hand, small ones, wrong
-/// harmonics had 0.49 to 0.9, nearly all more than 0.55.
-const MOST_UNCOUNTED_BLUR: f32 = 0.5;
-/// The same below which parts that were counted and have an overtone have edges, however large a share of the radius that is: 0.1 of it
-/// is this for four blades, and half of this for two.
-const CLEAR_BLUR: f32 = 0.4;
-/// Standard deviation of the events' times in dim light, and in bright light.
-const MOST_JITTER_S: f32 = 200e-6;
-const LEAST_JITTER_S: f32 = 40e-6;
-/// Scatter of a phase by that jitter beyond which a registration is not believed where it contradicts.
-const MOST_SCATTER_RAD: f32 = 0.8;
-/// The same beyond which it leaves no edge: half an octave past the harmonic that it shows best.
-const NO_EDGE_RAD: f32 = 1.41;
-/// Blur that a jitter of one pixel makes as the pose measures it, where the harmonic rises by doubling: up to half an octave
-/// past the best, where 1 / (m exp(-m^2 / 2)) is 1.9.
-const BLUR_OF_JITTER: f32 = 1.9;
 /// Farthest deviation of the fractional-baseline test where the harmonic is in doubt, as a share of the angle of symmetry; or
 /// half of what a speed by one winding more would show, where that is more: this fraction of the difference of the two angles.
 const MOST_DEVIATION: f32 = 0.03;
@@ -254,19 +226,6 @@ impl Measurement {
         is_rival || off.abs() > (REFINED_SIGMAS * sigma).max(REFINED_AGREEMENT)
     }
 
-    /// Whether jitter may scatter the blades' edges over so much of their distance that a registration matches noise: no overtone is
-    /// left of them. Then the phase alone tells, by all events of the window; but not where a neighbour of the harmonic may keep
-    /// step alone, as it does about the centre of a small rotor.
-    pub(super) fn registers(&self) -> bool {
-        let in_step_alone = self.doubted() || self.disc.radius_px < SMALL_PX;
-        self.scatter_rad() < MOST_SCATTER_RAD || self.pose.has_overtone() || in_step_alone
-    }
-
-    /// By how much the jitter of dim light scatters the phase that is followed: sigma scatters a phase of m w t by m w sigma.
-    fn scatter_rad(&self) -> f32 {
-        self.harmonic as f32 * self.omega_rad_s.abs() * MOST_JITTER_S
-    }
-
     /// Whether the rotor is also where it should be between whole periods, where an alias is not.
     // Not inlined: it is called in two places.
     #[inline(never)]
@@ -279,89 +238,6 @@ impl Measurement {
     /// Parts in what counts as one: where they were not counted, at least as many as the windings of the line.
     fn uncounted(&self) -> u32 {
         if self.parts.is_none() { self.windings.max(1) } else { 1 }
-    }
-
-    /// Share of the events that a rotor of this speed keeps in step at least.
-    pub(super) fn least_coherence(&self) -> f32 {
-        let scatter_rad = self.scatter_rad();
-        // exp(-x^2 / 2) to a few percent, and never zero.
-        let kept = 1.0 / (1.0 + 0.25 * scatter_rad * scatter_rad);
-        LEAST_COHERENCE * kept * kept
-    }
-
-    /// Whether so few events keep step that only a reading shows a rotor.
-    pub(super) fn is_faint(&self, coherence: f32) -> bool {
-        coherence < FAINT * self.least_coherence()
-    }
-
-    /// Whether the rotor has edges: what merely keeps step with one frequency has none, and a wrong harmonic about a wrong
-    /// centre has no overtone. It blurs them, too: where another harmonic keeps step at all, noise is no excuse, nor is the jitter of
-    /// dim light where that of a rotor that is not small is in doubt. Without polarity leading edges are matched with trailing ones, and what could not be
-    /// counted may be a winding more than there are blades: only sharp ones tell.
-    pub(super) fn has_edges(&self, ignores_polarity: bool) -> bool {
-        if self.in_doubt() {
-            return false;
-        }
-        let radius_px = self.disc.radius_px;
-        let most_px = if !self.doubted() {
-            self.blur_px(MOST_RIVALLED_BLUR, MOST_JITTER_S)
-        } else if ignores_polarity {
-            share_px(LEAST_BLUR, radius_px)
-        } else if self.parts.is_none() {
-            share_px(LEAST_BLUR, radius_px).min(MOST_UNCOUNTED_BLUR * self.winding_px())
-        } else if radius_px >= SMALL_PX {
-            self.blur_px(MOST_RIVALLED_BLUR, LEAST_JITTER_S)
-        } else {
-            self.blur_px(MOST_RIVALLED_BLUR, MOST_JITTER_S)
-        };
-        let sharp = !self.rivalled() || self.pose.sharpness_px() < most_px;
-        self.too_fast_for_edges()
-            || self.is_clear(ignores_polarity)
-            || self.edges_px() < self.blur_px(MOST_BLUR, MOST_JITTER_S) && sharp
-    }
-
-    /// Whether so many events keep step as do at this speed, which was asked before, and no more is to be seen.
-    // Not inlined: flash is short.
-    #[inline(never)]
-    fn too_fast_for_edges(&self) -> bool {
-        self.scatter_rad() > NO_EDGE_RAD && !self.doubted()
-    }
-
-    /// Whether the edges are so sharp that a registration that went astray does not count against them. Noise, which leads it
-    /// astray, is no blur where no other harmonic keeps step.
-    pub(super) fn sharp(&self) -> bool {
-        let blur_px = if self.doubted() { self.pose.sharpness_px() } else { self.edges_px() };
-        self.too_fast_for_edges() || blur_px < self.blur_px(LEAST_BLUR, MOST_JITTER_S)
-    }
-
-    /// Whether parts that were counted show edges between one and the next, noise and all. A single mark has no next one, and two that
-    /// differ may be one.
-    fn is_clear(&self, ignores_polarity: bool) -> bool {
-        self.parts.is_some_and(|parts| parts > 1)
-            && !self.may_be_mark()
-            && self.harmonic > 1
-            && !(ignores_polarity && self.doubted())
-            && self.has_overtone_within(CLEAR_BLUR)
-    }
-
-    /// Whether the rotor may be a single mark: two parts that differ may be one.
-    fn may_be_mark(&self) -> bool {
-        self.parts == Some(1) || self.parts == Some(2) && !self.alike
-    }
-
-    /// How sharp the edges are. A single mark is told from its axis's shaking by its sharpness alone, so noise counts against it.
-    // Not inlined: flash is short.
-    #[inline(never)]
-    fn edges_px(&self) -> f32 {
-        if self.parts == Some(1) { self.pose.sharpness_px() } else { self.pose.blur_px() }
-    }
-
-    // Not inlined: it is called in several places.
-    #[inline(never)]
-    fn blur_px(&self, most: (f32, f32), jitter_s: f32) -> f32 {
-        let radius_px = self.disc.radius_px;
-        let jitter_px = 0.5 * radius_px * self.omega_rad_s.abs() * jitter_s;
-        share_px(most, radius_px) + BLUR_OF_JITTER * jitter_px
     }
 
     /// Adds to the lock's error what may bias all its registrations alike.
@@ -420,11 +296,6 @@ impl Measurement {
         });
         even && !self.doubted() && (self.rates_alike(omega) || self.sharp())
     }
-}
-
-/// A share of the radius, but at least so many pixels.
-fn share_px((share, px): (f32, f32), radius_px: f32) -> f32 {
-    (share * radius_px).max(px)
 }
 
 /// Mean weighted by the inverse variances, of witnesses whose errors have something in common, and which may be so many standard
