@@ -1,7 +1,8 @@
 //! `evtach bench`: each table of the README from one command.
 //!
 //! Everything here is measured on synthetic recordings, whose truth is exact; [`spec`] says what they are. The
-//! tachometer is told nothing: no speed, no blade count, no centre.
+//! tachometer is told nothing: no speed, no blade count, no centre. Whatever falls short of what is asked is named, and makes the exit
+//! code 1; of `--quick` and few seeds only wrong readings do.
 
 mod accuracy;
 mod blind;
@@ -100,8 +101,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         report.print(&common)?;
     }
     // Not to stdout, which may hold records for a program.
-    for wrong in &report.wrong {
-        eprintln!("{wrong}");
+    for short in &report.short {
+        eprintln!("{short}");
     }
-    Ok(if report.wrong.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(if report.short.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

@@ -99,6 +99,7 @@ pub fn run(args: &Args) -> anyhow::Result<Report> {
         let rows: Vec<Row> = rows.collect();
         report.tables.push(table(&rows, model, seeds));
         report.records.extend(rows.iter().map(|row| row.record(model)));
+        report.short.extend(rows.iter().filter_map(|row| row.short(model)));
     }
     Ok(report)
 }
@@ -166,6 +167,16 @@ impl Row {
         ppm <= GOOD_PPM || ppm <= self.best() / 2.0
     }
 
+    /// Names the cell where more is asked.
+    fn short(&self, model: Model) -> Option<String> {
+        let (condition, rpm, _) = PUBLISHED[self.cell];
+        let Self { full_ppm, .. } = self;
+        (!self.passes(*full_ppm)).then(|| {
+            let (half, model) = (self.best() / 2.0, spec::model_name(model));
+            format!("{condition}, {rpm} rpm, {model} model: {full_ppm:.1} ppm, more than {GOOD_PPM} and than half the best, {half:.1}")
+        })
+    }
+
     fn record(&self, model: Model) -> Map<String, Value> {
         let (condition, rpm, others) = PUBLISHED[self.cell];
         let mut record = Map::new();
@@ -227,6 +238,10 @@ mod tests {
         assert!(row(650.0).passes(650.0));
         assert!(!row(651.0).passes(651.0));
         assert!(!row(f64::NAN).passes(f64::NAN));
+        assert_eq!(row(650.0).short(Model::Edge), None);
+        let short = row(651.0).short(Model::Edge).unwrap_or_default();
+        assert!(short.starts_with("handheld, 20000 rpm, edge model: 651.0 ppm"), "{short}");
+        assert!(row(f64::NAN).short(Model::Edge).is_some());
     }
 
     #[test]

@@ -31,8 +31,8 @@ pub struct Report {
     pub tables: Vec<Table>,
     /// For programs: one flat object a cell.
     pub records: Vec<Map<String, Value>>,
-    /// What was read wrongly, for a benchmark that must not find any.
-    pub wrong: Vec<String>,
+    /// What was read wrongly, or falls short of what is asked: one line each.
+    pub short: Vec<String>,
 }
 
 impl Report {

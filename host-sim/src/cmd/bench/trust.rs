@@ -3,14 +3,15 @@
 //! Random scenes, a fifth of them without any rotor ([`scenes`] says which), over both event models. Every reading of every
 //! recording is compared with the room's truth of its own window. How often the stated error holds is asked of the last
 //! speed of each rotor, as readings of one recording are much alike; of all speeds is told how many are more than six of
-//! it off. Results go to a file line by line, so that a long run may be stopped and taken up again. A wrong reading makes
-//! the exit code 1.
+//! it off. Results go to a file line by line, so that a long run may be stopped and taken up again by the same build. A wrong reading
+//! makes the exit code 1, and so does what falls short of what is asked in a thousand scenes or more.
 
 mod scenes;
 mod tally;
 
 use std::collections::BTreeSet;
 use std::fs::OpenOptions;
+use std::hash::{DefaultHasher, Hasher as _};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -38,6 +39,9 @@ pub struct Args {
     /// Number of scenes.
     #[arg(long)]
     trials: Option<u64>,
+    /// Seed of the first scene, for scenes that nobody has seen [default: 1000, the first scored one].
+    #[arg(long, value_name = "SEED", conflicts_with = "tuning")]
+    first: Option<u64>,
     /// Results so far; scenes that are in it are not run again.
     #[arg(long, default_value = "evtach-trust.jsonl")]
     file: PathBuf,
@@ -51,6 +55,19 @@ pub struct Args {
 struct Head {
     scenes_version: u32,
     version: String,
+    /// Hash of the program: another build may read the same scene otherwise.
+    build: u64,
+}
+
+impl Head {
+    fn of_this_build() -> anyhow::Result<Self> {
+        let program = std::env::current_exe().and_then(std::fs::read);
+        let mut build = DefaultHasher::new();
+        build.write(&program.context("this program cannot be read")?);
+        let build = build.finish();
+        let version = env!("CARGO_PKG_VERSION").to_owned();
+        Ok(Self { scenes_version: SCENES_VERSION, version, build })
+    }
 }
 
 /// What became of one scene.
@@ -58,9 +75,8 @@ struct Head {
 struct Trial {
     /// Seed of the scene.
     trial: u64,
-    /// Event model of the scene; older files do not tell, then [`resume`] does.
-    #[serde(default)]
-    model: Option<Model>,
+    /// Event model of the scene.
+    model: Model,
     /// Rotors in the scene.
     rotors: usize,
     /// One for each capacity.
@@ -77,11 +93,9 @@ struct Outcome {
     speeds: usize,
     /// Of these, more than 1 % off.
     wrong: usize,
-    /// Of the speeds, those with a standard error; 0 in older files, which did not count them.
-    #[serde(default)]
+    /// Of the speeds, those with a standard error.
     with_sigma: usize,
     /// Of these, more than six standard errors off.
-    #[serde(default)]
     beyond_6: usize,
     /// Why the last reading gave no speed at all.
     reason: Option<String>,
@@ -114,8 +128,8 @@ pub fn run(args: &Args) -> anyhow::Result<Report> {
     if args.common.tuning && count > spec::SCORED_FROM {
         bail!("there are only {} tuning seeds: give --trials {0} or fewer", spec::SCORED_FROM);
     }
-    let first = spec::first_seed(args.common.tuning);
-    let wanted = first..first + count;
+    let first = args.first.unwrap_or_else(|| spec::first_seed(args.common.tuning));
+    let wanted = first..first.saturating_add(count);
     let known = if args.common.quick { Vec::new() } else { resume(&args.file)? };
     let done: BTreeSet<u64> = known.iter().map(|t| t.trial).collect();
     let todo: Vec<u64> = wanted.clone().filter(|t| !done.contains(t)).collect();
@@ -153,8 +167,7 @@ pub fn run(args: &Args) -> anyhow::Result<Report> {
 
 /// Reads what a run before left, and starts the file where there is none.
 fn resume(path: &Path) -> anyhow::Result<Vec<Trial>> {
-    let head =
-        Head { scenes_version: SCENES_VERSION, version: env!("CARGO_PKG_VERSION").to_owned() };
+    let head = Head::of_this_build()?;
     if !path.exists() {
         let mut file = std::fs::File::create(path).with_context(|| {
             format!("{}: cannot be created; choose another --file", path.display())
@@ -167,7 +180,7 @@ fn resume(path: &Path) -> anyhow::Result<Vec<Trial>> {
     let mut lines = text.lines();
     let first = lines.next().unwrap_or_default();
     if serde_json::from_str::<Head>(first).ok().as_ref() != Some(&head) {
-        bail!("{}: made by another version; delete it or choose another --file", path.display());
+        bail!("{}: made by another build; delete it or choose another --file", path.display());
     }
     // A run that was stopped may have left half a line: it is ended, and its scene is run again.
     if !text.ends_with('\n') {
@@ -176,11 +189,7 @@ fn resume(path: &Path) -> anyhow::Result<Vec<Trial>> {
             format!("{}: cannot be written; choose another --file", path.display())
         })?;
     }
-    let mut trials: Vec<Trial> = lines.filter_map(|line| serde_json::from_str(line).ok()).collect();
-    for trial in &mut trials {
-        trial.model.get_or_insert_with(|| scenes::scene(trial.trial).model);
-    }
-    Ok(trials)
+    Ok(lines.filter_map(|line| serde_json::from_str(line).ok()).collect())
 }
 
 fn measure(number: u64) -> anyhow::Result<Trial> {
@@ -199,7 +208,7 @@ fn measure(number: u64) -> anyhow::Result<Trial> {
     });
     Ok(Trial {
         trial: number,
-        model: Some(scene.model),
+        model: scene.model,
         rotors: scene.rotors.len(),
         results: results.collect(),
     })
@@ -262,7 +271,7 @@ mod tests {
 
     fn args(file: PathBuf, trials: u64) -> Args {
         let common = Common { quick: false, json: false, csv: false, jobs: None, tuning: true };
-        Args { common, trials: Some(trials), file, show: None }
+        Args { common, trials: Some(trials), first: None, file, show: None }
     }
 
     #[test]
@@ -288,22 +297,14 @@ mod tests {
     }
 
     #[test]
-    fn older_files_are_read_and_those_of_other_scenes_are_not() {
+    fn a_file_of_other_scenes_or_of_another_build_is_not_gone_on_with() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("trust.jsonl");
         assert!(resume(&path).unwrap().is_empty());
-        let old = r#"{"trial":5,"rotors":1,"results":[{"capacity":"full","ghosts":0,"speeds":2,"wrong":0,
-            "reason":null,"rotors":[{"owed":true,"error":1e-4,"sigma":1e-4,"locked":true,"reason":null}]}]}"#;
-        let mut file = OpenOptions::new().append(true).open(&path).unwrap();
-        writeln!(file, "{}", old.replace('\n', "")).unwrap();
-        let trials = resume(&path).unwrap();
-        assert_eq!(trials.len(), 1);
-        assert_eq!(trials[0].model, Some(scenes::scene(5).model));
-        assert_eq!((trials[0].results[0].speeds, trials[0].results[0].with_sigma), (2, 0));
-        let head = std::fs::read_to_string(&path)
-            .unwrap()
-            .replace("\"scenes_version\":", "\"scenes_version\":9");
-        std::fs::write(&path, head).unwrap();
-        assert!(resume(&path).unwrap_err().to_string().contains("made by another version"));
+        let head = std::fs::read_to_string(&path).unwrap();
+        for (key, other) in [("\"scenes_version\":", "9"), ("\"build\":", "0,\"was\":")] {
+            std::fs::write(&path, head.replace(key, &format!("{key}{other}"))).unwrap();
+            assert!(resume(&path).unwrap_err().to_string().contains("made by another build"));
+        }
     }
 }

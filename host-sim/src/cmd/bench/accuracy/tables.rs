@@ -54,7 +54,7 @@ const ROLL: Limit = (
 );
 /// The speed in rpm from which the paper's 150 ms hold more than a turn: a mean of its own, as slower ones rule the mean
 /// over all, or have no reading in that window and so leave none.
-const FAST_RPM: u32 = 600;
+pub const FAST_RPM: u32 = 600;
 /// Quotient up to which a cell is near its limit.
 const NEAR: f64 = 3.0;
 

@@ -2,9 +2,10 @@
 
 use serde_json::{Map, Value};
 
+use super::super::drive::Capacity;
 use super::super::report::{Table, counted};
 use super::super::spec;
-use super::{Found, MAX_PASSAGES, Outcome, Verdict};
+use super::{ASKED_SHARE, Found, MAX_PASSAGES, Outcome, Verdict};
 
 /// Rights by speed and blades, and their sums as notes.
 pub fn table(title: String, all: &[&Outcome], speeds: &[f64], counts: &[u8]) -> Table {
@@ -69,6 +70,16 @@ pub fn wrong(o: &Outcome) -> Option<String> {
     })
 }
 
+/// Says how many are right with this memory where a reading is owed, if more is asked.
+pub fn refused(all: &[Outcome], capacity: Capacity) -> Option<String> {
+    let owed: Vec<_> = all.iter().filter(|o| o.capacity == capacity && o.owed).collect();
+    let right = owed.iter().filter(|o| o.found.verdict == Verdict::Right).count();
+    ((right as f64) < ASKED_SHARE * owed.len() as f64).then(|| {
+        let (owed, capacity) = (owed.len(), capacity.as_str());
+        format!("right where owed: {right} of {owed}, {capacity} memory; asked: {ASKED_SHARE}")
+    })
+}
+
 /// For programs.
 pub fn record(o: &Outcome) -> Map<String, Value> {
     let verdict = match o.found.verdict {
@@ -97,7 +108,6 @@ pub fn record(o: &Outcome) -> Map<String, Value> {
 mod tests {
     use evtach_host::synth::Model;
 
-    use super::super::super::drive::Capacity;
     use super::super::super::report::Report;
     use super::super::super::report::tests::assert_readable;
     use super::super::super::score::Scores;
@@ -123,6 +133,10 @@ mod tests {
             outcome(60_000.0, true, refused("too_fast")),
             outcome(60_000.0, true, Scores::default()),
         ];
+        assert_eq!(super::refused(&outcomes, Capacity::Full), None);
+        let half = [outcome(3000.0, false, told(0.001)), outcome(60.0, false, Scores::default())];
+        let short = super::refused(&half, Capacity::Full).unwrap_or_default();
+        assert_eq!(short, "right where owed: 1 of 2, full memory; asked: 0.99");
         let all: Vec<&Outcome> = outcomes.iter().collect();
         let table = table("blind".to_owned(), &all, &[3000.0, 60_000.0], &[3]);
         assert_eq!(

@@ -1,5 +1,7 @@
 //! Sums over the trials.
 
+use std::ops::RangeInclusive;
+
 use serde_json::{Map, Value};
 
 use super::super::drive::Capacity;
@@ -72,58 +74,52 @@ impl Tally {
         let line = |key, name, count, of, asked| Line { key, name, count, of, asked };
         let turning_scenes = self.scenes - self.still_scenes;
         [
-            line(
-                "wrong",
-                "speeds more than 1 % off, all readings",
-                self.wrong,
-                self.speeds,
-                "none",
-            ),
+            line("wrong", "speeds more than 1 % off, all readings", self.wrong, self.speeds, NONE),
             line(
                 "ghosts",
                 "speeds where no rotor is, beside one",
                 self.ghosts,
                 turning_scenes,
-                "none",
+                NONE,
             ),
             line(
                 "ghost_scenes",
                 "still scenes with any speed",
                 self.ghost_scenes,
                 self.still_scenes,
-                "none",
+                NONE,
             ),
             line(
                 "beyond_6_sigma",
                 "beyond 6 sigma, all readings",
                 self.beyond_6,
                 self.with_sigma,
-                "",
+                None,
             ),
             line(
                 "last_beyond_6_sigma",
                 "beyond 6 sigma, last reading",
                 self.last_beyond_6,
                 self.last_with_sigma,
-                "at most 1 in 2000",
+                Some(("at most 1 in 2000", 0.0..=1.0 / 2000.0)),
             ),
             line(
                 "last_within_1_96_sigma",
                 "truth within 1.96 sigma, last reading",
                 self.last_within_95,
                 self.last_with_sigma,
-                "92 to 98 %",
+                Some(("92 to 98 %", 0.92..=0.98)),
             ),
             line(
                 "owed_refused",
                 "refused although a reading is owed",
                 self.owed_refused,
                 self.owed,
-                "at most 3 %",
+                Some(("at most 3 %", 0.0..=0.03)),
             ),
-            line("read", "rotors read", self.read, self.rotors, "at least 60 %"),
-            line("locked", "of these locked", self.locked, self.read, ""),
-            line("refused", "rotors refused", self.rotors - self.read, self.rotors, ""),
+            line("read", "rotors read", self.read, self.rotors, Some(("at least 60 %", 0.6..=1.0))),
+            line("locked", "of these locked", self.locked, self.read, None),
+            line("refused", "rotors refused", self.rotors - self.read, self.rotors, None),
         ]
     }
 }
@@ -135,8 +131,27 @@ struct Line {
     name: &'static str,
     count: usize,
     of: usize,
-    /// The limit that is asked for.
-    asked: &'static str,
+    asked: Asked,
+}
+
+/// What is asked of a share, in words and in numbers.
+type Asked = Option<(&'static str, RangeInclusive<f64>)>;
+
+const NONE: Asked = Some(("none", 0.0..=0.0));
+/// Scenes from which on a share tells.
+const ENOUGH_SCENES: usize = 1000;
+
+impl Line {
+    fn share(&self) -> f64 {
+        self.count as f64 / self.of.max(1) as f64
+    }
+
+    /// Says what is asked, where the share is not that.
+    fn short(&self) -> Option<String> {
+        let Self { name, count, of, asked, .. } = self;
+        let (text, range) = asked.as_ref()?;
+        (!range.contains(&self.share())).then(|| format!("{name}: {count} of {of}; asked: {text}"))
+    }
 }
 
 /// Names the scene where speeds were wrong, or were told where no rotor is.
@@ -156,14 +171,18 @@ fn wrong(trial: &Trial) -> impl Iterator<Item = String> + '_ {
 
 /// The report over all trials: for each capacity a table of all, and one for each event model.
 pub fn report(trials: &[Trial]) -> Report {
-    let wrong = trials.iter().flat_map(wrong).collect();
-    let mut report = Report { name: "trust", wrong, ..Report::default() };
+    let short = trials.iter().flat_map(wrong).collect();
+    let mut report = Report { name: "trust", short, ..Report::default() };
     for model in std::iter::once(None).chain(MODELS.map(Some)) {
         for capacity in Capacity::ALL {
             let mut tally = Tally::default();
-            for trial in trials.iter().filter(|t| model.is_none() || t.model == model) {
+            for trial in trials.iter().filter(|t| model.is_none_or(|model| t.model == model)) {
                 let of = trial.results.iter().filter(|o| o.capacity == capacity.as_str());
                 of.for_each(|outcome| tally.add(trial, outcome));
+            }
+            if model.is_none() && tally.scenes >= ENOUGH_SCENES {
+                let short = tally.lines().into_iter().filter_map(|line| line.short());
+                report.short.extend(short.map(|s| format!("{} memory: {s}", capacity.as_str())));
             }
             let model = model.map_or("both", model_name);
             report.tables.push(table(&tally, model, capacity));
@@ -179,9 +198,16 @@ fn table(tally: &Tally, model: &str, capacity: Capacity) -> Table {
         let reasons = counted(tally.reasons.iter().map(String::as_str));
         notes.push(format!("reasons of the refused: {reasons}"));
     }
-    let rows = tally.lines().map(|Line { name, count, of, asked, .. }| {
-        let share = format!("{:.2} %", 100.0 * count as f64 / of.max(1) as f64);
-        vec![name.to_owned(), count.to_string(), of.to_string(), share, asked.to_owned()]
+    let rows = tally.lines().map(|line| {
+        let share = format!("{:.2} %", 100.0 * line.share());
+        let asked = line.asked.map_or("", |(text, _)| text);
+        vec![
+            line.name.to_owned(),
+            line.count.to_string(),
+            line.of.to_string(),
+            share,
+            asked.to_owned(),
+        ]
     });
     Table {
         title: format!(
@@ -237,15 +263,11 @@ mod tests {
             spoken(None, 0.0, true),
             spoken(None, 0.0, false),
         ];
-        let turning = Trial {
-            trial: 0,
-            model: Some(Model::Edge),
-            rotors: 4,
-            results: vec![outcome(0, rotors)],
-        };
+        let turning =
+            Trial { trial: 0, model: Model::Edge, rotors: 4, results: vec![outcome(0, rotors)] };
         let still = Trial {
             trial: 1,
-            model: Some(Model::Threshold),
+            model: Model::Threshold,
             rotors: 0,
             results: vec![outcome(2, Vec::new())],
         };
@@ -259,6 +281,9 @@ mod tests {
         assert_eq!((tally.beyond_6, tally.with_sigma), (4, 6));
         assert_eq!((tally.ghost_scenes, tally.still_scenes, tally.ghosts), (1, 1, 0));
         assert_eq!(tally.reasons, ["no_rotation"; 2]);
+        let short: Vec<_> = tally.lines().into_iter().filter_map(|line| line.short()).collect();
+        let refused = "refused although a reading is owed: 1 of 3; asked: at most 3 %";
+        assert!(short.len() == 5 && short.contains(&refused.to_owned()), "{short:?}");
         assert_eq!(wrong(&turning).count(), 0);
         let named: Vec<_> = wrong(&still).collect();
         assert!(named.len() == 1 && named[0].contains("--show 1 "), "{named:?}");
