@@ -316,7 +316,7 @@ fn nine_eleven_and_sixteen_spokes() {
 #[test]
 fn one_odd_blade() {
     let mut wrong = Vec::new();
-    for (seed, blades) in [(73, 3), (74, 5)] {
+    for (seed, blades) in [(73, 3), (74, 5), (75, 2), (76, 4), (77, 6), (78, 7), (79, 8)] {
         let rotor = Rotor { blades, odd_width: 0.6, ..at(173.0, 130.0, 55.0, 1900.0) };
         let scene = scene(seed, vec![rotor]);
         for capacity in Capacity::ALL {
