@@ -384,13 +384,19 @@ fn under_a_lamp(lit: &Scene, owed: bool) -> Vec<String> {
     Capacity::ALL.into_iter().flat_map(wrong).collect()
 }
 
-/// Blades that pass as often as the lamp flashes: the line is one, and only where it turns is it a rotor.
+/// Blades that pass as often as the lamp flashes, or as one of its overtones does: the line is one, and only where it turns is it a rotor.
 #[test]
 fn blades_in_step_with_the_lamp() {
     let mut wrong = Vec::new();
-    for (seed, frequency_hz, blades, rpm) in
-        [(81, 100.0, 4, 1500.0), (82, 120.0, 3, 2400.0), (83, 100.0, 3, -2000.0)]
-    {
+    let in_step = [
+        (81, 100.0, 4, 1500.0),
+        (82, 120.0, 3, 2400.0),
+        (83, 100.0, 3, -2000.0),
+        (84, 100.0, 4, 3000.0),
+        (85, 120.0, 3, -4800.0),
+        (86, 100.0, 3, 6000.0),
+    ];
+    for (seed, frequency_hz, blades, rpm) in in_step {
         let lamp = Lamp { frequency_hz, ..dim() };
         let rotor = Rotor { blades, ..at(173.0, 130.0, 50.0, rpm) };
         let lit = Scene { lamp: Some(lamp), ..scene(seed, vec![rotor]) };
