@@ -177,8 +177,8 @@ impl Grid {
         best: &mut (usize, f32),
     ) {
         let (from, to) = (row * SIDE + from, row * SIDE + to + 1);
-        let start = self.starts.get(from).copied().map_or(0, usize::from);
-        let end = self.starts.get(to).copied().map_or(0, usize::from);
+        let (Some(start), Some(end)) = (self.starts.get(from), self.starts.get(to)) else { return };
+        let (start, end) = (usize::from(*start), usize::from(*end));
         let Some(places) = self.places.get(start..end) else { return };
         for (at, [x, y, t]) in (start..).zip(places) {
             let (dx, dy, dt) = (x - query[0], y - query[1], t - query[2]);

@@ -164,10 +164,15 @@ impl<'m> HeatMap<'m> {
     /// Lets the map fade by one part in `window_segments`, for each of so many segments by which a window slid.
     #[inline(never)]
     pub fn fade(&mut self, segments: usize, window_segments: u16) {
+        let parts = u32::from(window_segments.max(1));
+        // Rounded up so, as `div_ceil` takes twice as long.
+        let round_up = parts - 1;
         for count in self.counts.iter_mut().filter(|count| **count > 0) {
+            let mut left = u32::from(*count);
             for _ in 0..segments {
-                *count -= count.div_ceil(window_segments);
+                left -= (left + round_up) / parts;
             }
+            *count = left as u16;
         }
     }
 
