@@ -3,8 +3,8 @@
 //! Right: the conclusive reading is within 1 % and has the right direction. Wrong: any reading of the recording is not, or
 //! tells a speed where no rotor is; that makes the exit code 1, and so does less than [`ASKED_SHARE`] right of where a reading is owed,
 //! unless it is a quick run. A reading is owed where the window holds three symmetry
-//! periods and two turns (2 s at most), the rotor makes 2000 events a turn, and the blades pass at most 150 000 times a
-//! minute; elsewhere a refusal is as good as a reading.
+//! periods and two turns (2 s at most), the rotor makes 2000 events a turn, it turns at most 60 000 times a minute and its
+//! blades pass at most 150 000 times; elsewhere a refusal is as good as a reading.
 
 mod tables;
 
@@ -23,8 +23,9 @@ const SPEEDS_RPM: [f64; 13] = [
     60.0, 90.0, 150.0, 300.0, 600.0, 1200.0, 3000.0, 6000.0, 12_000.0, 20_000.0, 30_000.0,
     45_000.0, 60_000.0,
 ];
-/// Blade passages per minute beyond which `too_fast` is the right answer.
+/// Blade passages and turns a minute beyond which `too_fast` is the right answer: seeds turn up to 3 % faster than their row says.
 const MAX_PASSAGES: f64 = 150_000.0;
+const MAX_RPM: f64 = 60_000.0;
 /// Share of right ones among those that are owed a reading, at least.
 const ASKED_SHARE: f64 = 0.99;
 /// Events a turn from which a reading is owed.
@@ -59,7 +60,7 @@ struct Outcome {
     seed: u64,
     capacity: Capacity,
     owed: bool,
-    /// Whether blades pass so fast that `too_fast` is the right answer.
+    /// Whether it turns, or its blades pass, so fast that `too_fast` is the right answer.
     too_fast: bool,
     found: Found,
 }
@@ -139,7 +140,7 @@ fn measure(condition: &Condition, seed: u64) -> anyhow::Result<[Outcome; 2]> {
     let turns = scene.duration_s() * rpm / 60.0;
     let periods = turns * f64::from(condition.blades);
     let per_turn = made.truth.rotors[0].events as f64 / turns;
-    let too_fast = rpm * f64::from(condition.blades) > MAX_PASSAGES;
+    let too_fast = rpm > MAX_RPM || rpm * f64::from(condition.blades) > MAX_PASSAGES;
     let owed = turns >= 2.0 && periods >= 3.0 && per_turn >= OWED_EVENTS_PER_TURN && !too_fast;
     let Some(geometry) = Geometry::new(scene.width_px, scene.height_px) else {
         anyhow::bail!("the scene's sensor is larger than the tachometer's");

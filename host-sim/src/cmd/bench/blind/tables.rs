@@ -5,7 +5,7 @@ use serde_json::{Map, Value};
 use super::super::drive::Capacity;
 use super::super::report::{Table, counted};
 use super::super::spec;
-use super::{ASKED_SHARE, Found, MAX_PASSAGES, Outcome, Verdict};
+use super::{ASKED_SHARE, Found, MAX_PASSAGES, MAX_RPM, Outcome, Verdict};
 
 /// Rights by speed and blades, and their sums as notes.
 pub fn table(title: String, all: &[&Outcome], speeds: &[f64], counts: &[u8]) -> Table {
@@ -33,7 +33,7 @@ pub fn table(title: String, all: &[&Outcome], speeds: &[f64], counts: &[u8]) -> 
         let refused = all.iter().filter(|o| o.too_fast && o.found.verdict == Verdict::Refused);
         let reasons: Vec<&str> = refused.map(|o| o.found.reason.unwrap_or("not found")).collect();
         notes.push(format!(
-            "above {MAX_PASSAGES} passages a minute: {} of {too_fast} refused; {}",
+            "above {MAX_PASSAGES} passages or {MAX_RPM} turns a minute: {} of {too_fast} refused; {}",
             reasons.len(),
             counted(reasons)
         ));
@@ -143,7 +143,7 @@ mod tests {
             table.rows,
             [["3000", "1/1"], ["60000", "(0/3)"]].map(|row| row.map(str::to_owned).to_vec())
         );
-        let of_fast = "above 150000 passages a minute: 3 of 3 refused; too_fast 2, no_rotation 1";
+        let of_fast = "above 150000 passages or 60000 turns a minute: 3 of 3 refused; too_fast 2, no_rotation 1";
         assert!(table.notes.iter().any(|note| note == of_fast), "{:?}", table.notes);
         let records = outcomes.iter().map(record).collect();
         assert_readable(&Report {
