@@ -251,7 +251,8 @@ impl Measurement {
     // Not inlined: it is called in three places.
     #[inline(never)]
     fn widen_mark(&mut self, shake_px: f32) {
-        if self.may_be_mark() {
+        // Two parts that differ may be one.
+        if self.parts == Some(1) || self.parts == Some(2) && !self.alike {
             let turn_rad = self.evidence.periods.unwrap_or(0.0) * TAU;
             let shake = shake_px / (self.disc.radius_px * turn_rad) * self.omega_rad_s;
             self.estimate.sigma_rad_s = root_sum_square(self.estimate.sigma_rad_s, shake);
