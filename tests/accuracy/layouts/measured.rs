@@ -138,7 +138,7 @@ impl Measured {
     }
 }
 
-/// Every rotor with its right speed, within its standard error, with its blades and where it stands, in both memories.
+/// Every rotor with its right speed, within six standard errors, with its blades and where it stands, in both memories.
 pub fn all_read(name: &str, scene: &Scene) {
     let wrong: Vec<String> = Capacity::ALL
         .into_iter()

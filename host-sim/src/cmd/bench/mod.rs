@@ -2,7 +2,7 @@
 //!
 //! Everything here is measured on synthetic recordings, whose truth is exact; [`spec`] says what they are. The
 //! tachometer is told nothing: no speed, no blade count, no centre. Whatever falls short of what is asked is named, and makes the exit
-//! code 1; of `--quick` and few seeds only wrong readings do.
+//! code 1; of `--quick`, of few seeds of `accuracy` and few scenes of `trust` only wrong readings do.
 
 mod accuracy;
 mod blind;

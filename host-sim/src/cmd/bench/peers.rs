@@ -99,7 +99,10 @@ pub fn run(args: &Args) -> anyhow::Result<Report> {
         let rows: Vec<Row> = rows.collect();
         report.tables.push(table(&rows, model, seeds));
         report.records.extend(rows.iter().map(|row| row.record(model)));
-        report.short.extend(rows.iter().filter_map(|row| row.short(model)));
+        // One seed tells little.
+        if !quick {
+            report.short.extend(rows.iter().filter_map(|row| row.short(model)));
+        }
     }
     Ok(report)
 }

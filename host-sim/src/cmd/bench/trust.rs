@@ -40,7 +40,7 @@ pub struct Args {
     #[arg(long)]
     trials: Option<u64>,
     /// Seed of the first scene, for scenes that nobody has seen [default: 1000, the first scored one].
-    #[arg(long, value_name = "SEED", conflicts_with = "tuning")]
+    #[arg(long, value_name = "SEED", conflicts_with = "tuning", value_parser = clap::value_parser!(u64).range(spec::SCORED_FROM..))]
     first: Option<u64>,
     /// Results so far; scenes that are in it are not run again.
     #[arg(long, default_value = "evtach-trust.jsonl")]

@@ -3,7 +3,7 @@
 use evtach_host::synth::Model;
 
 use super::super::drive::Capacity;
-use super::super::spec::{Mount, SPEEDS_RPM};
+use super::super::spec::{Mount, SPEEDS_RPM, model_name};
 use super::cells::{Cells, Key, Place, Stage, Window};
 use super::tables::FAST_RPM;
 
@@ -46,6 +46,30 @@ impl Asked {
         }
     }
 
+    /// Says what the mean is, where more is asked.
+    fn short(&self, cells: &Cells, model: Model, capacity: Capacity) -> Option<String> {
+        let most = self.factor(capacity)? * self.permille;
+        let Self { stage, window, gyro, .. } = *self;
+        let key = |place| Key { place, model: model.into(), capacity, window, gyro };
+        let keys: Vec<Key> = self.places().into_iter().map(key).collect();
+        if keys.iter().any(|key| cells.get(key, stage).is_none()) {
+            return None;
+        }
+        let mean = cells.mean(&keys, stage);
+        if mean.is_some_and(|mean| mean <= most) {
+            return None;
+        }
+        let mean = mean.map_or_else(|| "none".to_owned(), |mean| format!("{mean:.3}"));
+        Some(format!(
+            "{}, {} blades, {}: {mean} permille, {} model, {} memory; asked: {most:.2}",
+            self.mount.as_str(),
+            self.blades,
+            stage.as_str(),
+            model_name(model),
+            capacity.as_str()
+        ))
+    }
+
     fn places(&self) -> Vec<Place> {
         let rpms = SPEEDS_RPM.map(|rpm| rpm as u32).into_iter().filter(|rpm| *rpm >= self.from_rpm);
         let Self { blades, mount, .. } = *self;
@@ -75,39 +99,11 @@ const ASKED: [Asked; 16] = [
 
 /// Names each mean that is larger than asked; of what was not measured nothing is said.
 pub fn short(cells: &Cells, models: &[Model]) -> Vec<String> {
-    let mut short = Vec::new();
-    for &model in models {
-        for capacity in Capacity::ALL {
-            for asked in &ASKED {
-                let key = |place| Key {
-                    place,
-                    model: model.into(),
-                    capacity,
-                    window: asked.window,
-                    gyro: asked.gyro,
-                };
-                let sums = asked.places().into_iter().map(|p| cells.get(&key(p), asked.stage));
-                let (Some(sums), Some(factor)) =
-                    (sums.collect::<Option<Vec<_>>>(), asked.factor(capacity))
-                else {
-                    continue;
-                };
-                let means = sums.iter().map(|sum| sum.mean()).collect::<Option<Vec<f64>>>();
-                let mean = means.map(|means| means.iter().sum::<f64>() / means.len() as f64);
-                let most = factor * asked.permille;
-                if mean.is_none_or(|mean| mean > most) {
-                    let mean = mean.map_or_else(|| "none".to_owned(), |mean| format!("{mean:.3}"));
-                    let (mount, blades) = (asked.mount.as_str(), asked.blades);
-                    let (stage, model) = (asked.stage.as_str(), super::spec::model_name(model));
-                    short.push(format!(
-                        "{mount}, {blades} blades, {stage}: {mean} permille, {model} model, {} memory; asked: {most:.2}",
-                        capacity.as_str()
-                    ));
-                }
-            }
-        }
-    }
-    short
+    let all = models.iter().flat_map(|model| Capacity::ALL.map(|capacity| (*model, capacity)));
+    all.flat_map(|(model, capacity)| {
+        ASKED.iter().filter_map(move |asked| asked.short(cells, model, capacity))
+    })
+    .collect()
 }
 
 #[cfg(test)]

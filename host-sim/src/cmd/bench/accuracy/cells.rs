@@ -210,6 +210,13 @@ impl Cells {
         self.0.get(key)?.get(index)
     }
 
+    /// Mean of a stage over cells that count alike; `None` where any of them has no value.
+    pub fn mean(&self, keys: &[Key], stage: Stage) -> Option<f64> {
+        let mean = |key| self.get(key, stage)?.mean();
+        let means = keys.iter().map(mean).collect::<Option<Vec<f64>>>()?;
+        (!means.is_empty()).then(|| means.iter().sum::<f64>() / means.len() as f64)
+    }
+
     /// Places that were measured.
     pub fn places(&self) -> Vec<Place> {
         let mut places: Vec<Place> = self.0.keys().map(|k| k.place).collect();

@@ -142,9 +142,8 @@ impl View<'_> {
 
     /// Mean over the places, `None` where any of them has no value.
     fn mean(&self, places: &[Place], (_, window, gyro, stage): &Column) -> Option<f64> {
-        let sum = |p: &Place| self.cells.get(&self.key(*p, *window, *gyro), *stage)?.mean();
-        let values = places.iter().map(sum).collect::<Option<Vec<f64>>>()?;
-        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+        let keys: Vec<Key> = places.iter().map(|p| self.key(*p, *window, *gyro)).collect();
+        self.cells.mean(&keys, *stage)
     }
 
     fn table(&self, title: &str, columns: &[Column], rows: &[Row]) -> Table {
