@@ -6,6 +6,7 @@
 //! then is the Fourier transform of the autocorrelation, chance taken off.
 
 use heapless::Vec;
+use microfft::Complex32;
 
 use super::angular::AngularSums;
 use super::polar::PolarEvent;
@@ -46,8 +47,8 @@ pub fn turn_back(angular: &mut AngularSums, track: &[PolarEvent], disc: Disc, om
         let (sin, cos) = event.angle().minus(rate.after(event.t_us)).sin_cos();
         let (mut s, mut c) = (sin, cos);
         for sum in &mut angular.sums[bank][..HARMONICS] {
-            sum.0 += c;
-            sum.1 += s;
+            sum.re += c;
+            sum.im += s;
             (c, s) = (c * cos - s * sin, s * cos + c * sin);
         }
     }
@@ -107,7 +108,7 @@ pub fn symmetry(angular: &AngularSums) -> Symmetry {
 fn powers(angular: &AngularSums) -> [f32; HARMONICS] {
     let mut powers = [0.0; HARMONICS];
     for (bank, count) in angular.sums.iter().zip(angular.counts).take(2 * RINGS) {
-        for (power, (re, im)) in powers.iter_mut().zip(bank) {
+        for (power, Complex32 { re, im }) in powers.iter_mut().zip(bank) {
             *power += (re * re + im * im - count as f32).max(0.0);
         }
     }

@@ -11,7 +11,7 @@ use crate::speed::angular::AngularSums;
 use crate::speed::baseline::Estimate;
 use crate::speed::initial::{Ladder, median};
 use crate::speed::path::Path;
-use crate::speed::phase::{harmonics, newton, scan};
+use crate::speed::phase::{newton, scan};
 use crate::speed::polar::{PolarEvent, PolarTrack};
 use crate::speed::symmetry::{symmetry, turn_back};
 use crate::store::{WINDOW_SEGMENTS, Window};
@@ -88,15 +88,7 @@ impl Measurement {
     /// Which harmonic of the line turns about the refined centre: first coarse witness.
     pub(super) fn scan(&mut self, polar: &[PolarEvent], angular: &mut AngularSums) {
         let line_hz = self.omega_rad_s.abs() * self.harmonic as f32 / TAU;
-        if self.turn == 0 {
-            angular.clear();
-        }
-        let (events, all) = self.next_events(polar);
-        scan(angular, events, self.disc, line_hz);
-        if !all {
-            return;
-        }
-        let scan = harmonics(angular);
+        let scan = scan(angular, polar, self.disc, line_hz);
         let standing = scan.second_share / scan.share.max(1e-3);
         let rival = scan.rival_share / scan.share.max(1e-3);
         self.evidence.scan_rad_s = (scan.best != 0).then(|| line_hz * TAU / scan.best as f32);
@@ -118,7 +110,6 @@ impl Measurement {
             self.second_look = true;
             self.omega_rad_s = omega_rad_s;
             self.harmonic = scan.best.unsigned_abs();
-            self.turn = 0;
             self.stage = Stage::Track;
             return;
         }
@@ -131,19 +122,10 @@ impl Measurement {
         self.other_windings =
             [scan.still_share, scan.mirror_share].map(|share| share / scan.share.max(1e-3));
         self.windings = self.harmonic;
-        self.turn = 0;
         self.stage = Stage::Symmetry;
     }
 
-    /// The rotor's events of the next step, and whether they are the last.
-    fn next_events<'p>(&mut self, polar: &'p [PolarEvent]) -> (&'p [PolarEvent], bool) {
-        let from = usize::from(self.turn) * EVENTS_A_STEP;
-        let to = (from + EVENTS_A_STEP).min(polar.len());
-        self.turn += 1;
-        (polar.get(from..to).unwrap_or(&[]), to == polar.len())
-    }
-
-    /// Angle of symmetry.
+    /// Angle of symmetry, some events a step.
     pub(super) fn symmetry(
         &mut self,
         stated: &Stated,
@@ -153,9 +135,11 @@ impl Measurement {
         if self.turn == 0 {
             angular.clear();
         }
-        let (events, all) = self.next_events(polar);
-        turn_back(angular, events, self.disc, self.omega_rad_s);
-        if !all {
+        let from = usize::from(self.turn) * EVENTS_A_STEP;
+        let to = (from + EVENTS_A_STEP).min(polar.len());
+        turn_back(angular, polar.get(from..to).unwrap_or(&[]), self.disc, self.omega_rad_s);
+        self.turn += 1;
+        if to < polar.len() {
             return;
         }
         let symmetry = symmetry(angular);

@@ -8,7 +8,7 @@ use super::{Measurement, Stage};
 use crate::math::{TAU, larger};
 use crate::rotors::Disc;
 use crate::speed::angular::AngularSums;
-use crate::speed::phase::{harmonics, scan};
+use crate::speed::phase::scan;
 use crate::speed::polar::{Annulus, PolarTrack, track};
 use crate::store::{Even, Window};
 
@@ -141,10 +141,9 @@ impl Doubt {
                 polar.push(event).ok();
             }
         }
-        angular.clear();
-        scan(angular, polar.get(collected..).unwrap_or(&[]), place, self.line_hz);
+        let seen = polar.get(collected..).unwrap_or(&[]);
+        let found = scan(angular, seen, place, self.line_hz);
         polar.truncate(collected);
-        let found = harmonics(angular);
         let mut less = (found.share, found.best);
         if found.share > self.share {
             less = (self.share, self.best.1);
