@@ -86,20 +86,26 @@ impl PolarEvent {
     pub fn seen_from(self, x_px: f32, y_px: f32, annulus: &Annulus) -> Option<Self> {
         let (sin, cos) = self.angle().sin_cos();
         let (dx, dy) = (self.radius_px() * cos - x_px, self.radius_px() * sin - y_px);
-        let place = annulus.within(dx, dy)?;
-        Some(Self::at(place, self.radius_polarity & 0x8000, self.t_us))
+        let (dx, dy, r2) = annulus.within(dx, dy)?;
+        Some(Self::at(dx, dy, r2, self.radius_polarity & 0x8000, self.t_us))
     }
 
-    fn at((dx, dy, r2): (f32, f32, f32), polarity: u16, t_us: i32) -> Self {
+    // One by one, as numbers are handed over in registers, and tuples in memory.
+    fn at(dx: f32, dy: f32, r2: f32, polarity: u16, t_us: i32) -> Self {
         let angle = (Turn::of_vector(dy, dx).0 >> 16) as u16;
         let radius = ((quick_sqrt(r2) * 16.0) as u16).min(0x7FFF);
         Self { t_us, angle, radius_polarity: radius | polarity }
     }
 
     /// Converts one event; `mid_us` is the middle of the window since its start.
-    fn new(event: StoredEvent, place: (f32, f32, f32), window: &Window<'_>, mid_us: i32) -> Self {
+    fn new(
+        event: StoredEvent,
+        (dx, dy, r2): (f32, f32, f32),
+        window: &Window<'_>,
+        mid_us: i32,
+    ) -> Self {
         let polarity = if window.is_on(event) { 0x8000 } else { 0 };
-        Self::at(place, polarity, event.since(window.start_us) - mid_us)
+        Self::at(dx, dy, r2, polarity, event.since(window.start_us) - mid_us)
     }
 }
 
