@@ -220,3 +220,50 @@ pub fn newton(
         domega_rad_s: solved[2] * per_us * 1e6,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::speed::polar::Annulus;
+
+    extern crate std;
+    use std::vec::Vec;
+
+    const DISC: Disc = Disc { x_px: 0.0, y_px: 0.0, radius_px: 40.0 };
+
+    /// Events of a pattern of so many windings that keeps step with a frequency, every third of them anywhere.
+    fn pattern(windings: i32, line_hz: f32) -> Vec<PolarEvent> {
+        let annulus = Annulus::of(DISC);
+        let mut state = 1_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        let event = |index: i32| {
+            let mut event = PolarEvent::default();
+            event.t_us = (150_000.0 * random()) as i32 - 75_000;
+            let winding = (windings.unsigned_abs() as f32 * random()) as i32 as f32;
+            let turns = line_hz * event.t_us as f32 * 1e-6 + winding + 0.1 * random();
+            let turns = if index % 3 == 0 { random() } else { turns / windings as f32 };
+            let (sin, cos) = Turn((turns.rem_euclid(1.0) * 4_294_967_296.0) as u32).sin_cos();
+            let r_px = DISC.radius_px * (0.3 + 0.7 * random());
+            event.seen_from(-r_px * cos, -r_px * sin, &annulus)
+        };
+        (0..3_000).filter_map(event).collect()
+    }
+
+    #[test]
+    fn the_winding_is_found_and_keeps_as_much_step_as_its_phases_do() {
+        let line_hz = 120.0;
+        for windings in (-16..=16).filter(|windings| *windings != 0) {
+            let track = pattern(windings, line_hz);
+            let found = scan(&mut AngularSums::EMPTY, &track, DISC, line_hz);
+            assert_eq!(found.best, windings, "{found:?}");
+            let omega_rad_s = line_hz * TAU / windings as f32;
+            let phases = Pattern::learn(&track, DISC, omega_rad_s, windings.unsigned_abs());
+            let share = phases.coherence();
+            assert!(share > 0.5 && (found.share - share).abs() < 0.01, "{share} {found:?}");
+            assert!(found.rival_share < 0.15, "{found:?}");
+        }
+    }
+}

@@ -128,8 +128,8 @@ mod tests {
                 angular.counts[bank] += 2_000;
                 for (k, sum) in angular.sums[bank][..HARMONICS].iter_mut().enumerate() {
                     let (sin, cos) = Turn::from_rad(at_rad).times(k as u32 + 1).sin_cos();
-                    sum.0 += 2_000.0 * cos;
-                    sum.1 += 2_000.0 * sin;
+                    sum.re += 2_000.0 * cos;
+                    sum.im += 2_000.0 * sin;
                 }
             }
         }

@@ -47,8 +47,8 @@ const ALIKE_SIGMA: f32 = 0.2;
 const COARSE_PHASE: f32 = 0.05;
 const COARSE_PHASE_SIGMA: f32 = 0.03;
 const COARSE_SPREAD: f32 = 0.5;
-/// No reading may be farther off than this, relative: three standard errors, the camera's roll among them, and all that a busy
-/// readout's queue may stretch the window by, must each fit into it.
+/// No reading may be farther off than this, relative: three standard errors, of a coarse one the camera's roll among them, and all that
+/// a busy readout's queue may stretch the window by, must each fit into it.
 const MOST_ERROR: f32 = 0.01;
 const MOST_SIGMA: f32 = MOST_ERROR / 3.0;
 /// Standard error of a coarse reading of less than three blades, as a share of how much its speed seems to swing.
@@ -158,8 +158,8 @@ impl Measurement {
             }
             _ => {}
         }
-        // What an axis may do that is not followed tells less, the fewer turns there are: a longer window does.
-        let rough = root_sum_square(self.estimate.sigma_rad_s, roll) / self.omega_rad_s.abs();
+        // What an axis that is not followed may do counts for less, the more turns there are: a longer window tells.
+        let rough = self.estimate.sigma_rad_s / self.omega_rad_s.abs();
         if self.status == Status::Locked && rough > MOST_SIGMA {
             self.status = Status::Refused(Reason::TooSlow);
             self.wanted_us = rough / MOST_SIGMA * window.duration_us as f32;
