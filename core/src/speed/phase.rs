@@ -257,7 +257,8 @@ mod tests {
         let line_hz = 120.0;
         for windings in (-16..=16).filter(|windings| *windings != 0) {
             let track = pattern(windings, line_hz);
-            let found = scan(&mut AngularSums::EMPTY, &track, DISC, line_hz);
+            let mut angular = AngularSums::EMPTY;
+            let found = scan(&mut angular, &track, DISC, line_hz);
             assert_eq!(found.best, windings, "{found:?}");
             let omega_rad_s = line_hz * TAU / windings as f32;
             let phases = Pattern::learn(&track, DISC, omega_rad_s, windings.unsigned_abs());

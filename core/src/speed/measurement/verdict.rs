@@ -47,10 +47,12 @@ const ALIKE_SIGMA: f32 = 0.2;
 const COARSE_PHASE: f32 = 0.05;
 const COARSE_PHASE_SIGMA: f32 = 0.03;
 const COARSE_SPREAD: f32 = 0.5;
-/// No reading may be farther off than this, relative: three standard errors, of a coarse one the camera's roll among them, and all that
-/// a busy readout's queue may stretch the window by, must each fit into it.
+/// No reading may be farther off than this, relative: so many standard errors of a coarse one, the camera's roll among them, and of a
+/// lock, which what a single mark's axis may do at most is in, and all that a busy readout's queue may stretch the window by, must each
+/// fit into it.
 const MOST_ERROR: f32 = 0.01;
-const MOST_SIGMA: f32 = MOST_ERROR / 3.0;
+const COARSE_SIGMAS: f32 = 3.0;
+const LOCK_FITS_SIGMAS: f32 = 2.5;
 /// Standard error of a coarse reading of less than three blades, as a share of how much its speed seems to swing.
 const UNEVEN_SHARE: f32 = 0.5;
 /// The largest relative error where the stream ended before a window was full.
@@ -160,9 +162,10 @@ impl Measurement {
         }
         // What an axis that is not followed may do counts for less, the more turns there are: a longer window tells.
         let rough = self.estimate.sigma_rad_s / self.omega_rad_s.abs();
-        if self.status == Status::Locked && rough > MOST_SIGMA {
+        let most = MOST_ERROR / LOCK_FITS_SIGMAS;
+        if self.status == Status::Locked && rough > most {
             self.status = Status::Refused(Reason::TooSlow);
-            self.wanted_us = rough / MOST_SIGMA * window.duration_us as f32;
+            self.wanted_us = rough / most * window.duration_us as f32;
         }
         let own = self.estimate.sigma_rad_s;
         let late = held_up * self.estimate.omega_rad_s;
@@ -276,7 +279,7 @@ impl Measurement {
             self.estimate.sigma_rad_s = root_sum_square(self.estimate.sigma_rad_s, swing_rad_s);
         }
         let short = window.duration_us < BASE_WINDOW_US;
-        let most = if short { MOST_SHORT_SIGMA } else { MOST_SIGMA };
+        let most = if short { MOST_SHORT_SIGMA } else { MOST_ERROR / COARSE_SIGMAS };
         let stretched = stretch > MOST_ERROR;
         let sigma_rad_s = root_sum_square(self.estimate.sigma_rad_s, roll_rad_s);
         let rough = sigma_rad_s > most * self.omega_rad_s.abs();
