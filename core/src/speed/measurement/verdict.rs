@@ -47,9 +47,9 @@ const ALIKE_SIGMA: f32 = 0.2;
 const COARSE_PHASE: f32 = 0.05;
 const COARSE_PHASE_SIGMA: f32 = 0.03;
 const COARSE_SPREAD: f32 = 0.5;
-/// No reading may be farther off than this, relative: so many standard errors of a coarse one, the camera's roll among them, and of a
-/// lock, which what a single mark's axis may do at most is in, and all that a busy readout's queue may stretch the window by, must each
-/// fit into it.
+/// No reading may be farther off than this, relative. All that a busy readout's queue may stretch the window by fits into it, and so
+/// many standard errors: of a coarse one, the camera's roll among them, and of a lock, where what a single mark's axis may do at most is
+/// among them.
 const MOST_ERROR: f32 = 0.01;
 const COARSE_SIGMAS: f32 = 3.0;
 const LOCK_FITS_SIGMAS: f32 = 2.5;
