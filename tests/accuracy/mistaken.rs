@@ -7,8 +7,9 @@ use evtach_host::synth::{Motion, Scene, generate};
 use evtach_tests::{Loaded, measure, show};
 use serde::Deserialize;
 
-/// Farthest that any speed may be off, relative: what `bench trust` asks.
+/// Farthest that any speed may be off, relative, and in its own standard errors: what `bench trust` asks.
 const MOST_ERROR: f64 = 0.01;
+const MOST_SIGMAS: f64 = 6.0;
 
 #[derive(Deserialize)]
 struct Mistake {
@@ -37,9 +38,14 @@ fn what_was_told_wrong_is_not_told_again() {
             for speed in reading.rotors.iter().filter_map(|rotor| rotor.speed) {
                 let rpm =
                     f64::from(speed.omega_rad_s) * f64::from(evtach_core::Speed::RPM_PER_RAD_S);
-                let right = |right_rpm: f64| (rpm / right_rpm - 1.0).abs() < MOST_ERROR;
+                let most = MOST_SIGMAS * f64::from(speed.rpm_sigma());
+                let right = |right_rpm: f64| {
+                    let off_rpm = (rpm - right_rpm).abs();
+                    off_rpm < MOST_ERROR * right_rpm.abs() && off_rpm < most
+                };
                 if !(0..scene.rotors.len()).filter_map(right_rpm).any(right) {
-                    failures.push(format!("{told}: {rpm:.1} rpm at {middle_s:.3} s"));
+                    let sigma = speed.rpm_sigma();
+                    failures.push(format!("{told}: {rpm:.1} +- {sigma:.2} rpm at {middle_s:.3} s"));
                 }
                 speeds += 1;
             }

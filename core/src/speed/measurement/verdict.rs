@@ -60,9 +60,10 @@ const MOST_SHORT_SIGMA: f32 = 0.012;
 /// What a hand shakes, in pixels, and blocks of a turn from which on a single mark's axis is told from the mark.
 const SHAKE_PX: f32 = 3.0;
 const MARK_BLOCKS: usize = 4;
-/// What a hand sways at a frequency near the turn's, in pixels, and the speed in rad/s up to which it does: 15 Hz. Of a single mark, that
-/// looks like a turn that is not even, however closely it is followed.
-const SWAY_PX: f32 = 1.5;
+/// What a hand sways at a frequency near the turn's, in pixels, and the speed in rad/s up to which it does: 15 Hz. Faster, it sways less,
+/// as the square of that: muscles shake what has a mass. Of a single mark, it looks like a turn that is not even, however closely it is
+/// followed.
+const SWAY_PX: f32 = 2.0;
 const SWAYING_RAD_S: f32 = 15.0 * TAU;
 /// What shadows, flicker and folded slices may bias a registration by, in radians: a fifth of a pixel half-way to the rim.
 const BIAS_RAD: f32 = 5e-3;
@@ -155,9 +156,8 @@ impl Measurement {
         match self.status {
             Status::Coarse => self.widen_coarse(window, held_up / QUEUE_SIGMA, roll),
             Status::Locked if self.pose.in_period() < MARK_BLOCKS => self.widen_mark(SHAKE_PX),
-            Status::Locked if roll > 0.0 && self.estimate.omega_rad_s.abs() < SWAYING_RAD_S => {
-                self.widen_mark(SWAY_PX);
-            }
+            // Blurred edges tell of an axis that moves and was not followed.
+            Status::Locked if roll > 0.0 || !self.sharp() => self.steady_mark(),
             _ => {}
         }
         // What an axis that is not followed may do counts for less, the more turns there are: a longer window tells.
@@ -255,13 +255,31 @@ impl Measurement {
         Estimate { sigma_rad_s: root_sum_square(lock.sigma_rad_s, bias), ..lock }
     }
 
+    /// Whether it may be a single mark: two parts that differ may be one.
+    fn may_be_mark(&self) -> bool {
+        self.parts == Some(1) || self.parts == Some(2) && !self.alike
+    }
+
+    /// From a hand, both witnesses of a mark's lock go along a path that takes part of the hand's motion for the mark's turn. The refinement
+    /// goes along none: it is a third one, and no surer than they are, however little its few pairs scatter.
+    fn steady_mark(&mut self) {
+        let swaying = SWAYING_RAD_S / self.estimate.omega_rad_s.abs().max(SWAYING_RAD_S);
+        self.widen_mark(SWAY_PX * swaying * swaying);
+        let Evidence { refined_rad_s, refined_sigma_rad_s, .. } = self.evidence;
+        if let (true, Some(omega_rad_s), Some(own)) =
+            (self.may_be_mark(), refined_rad_s, refined_sigma_rad_s)
+        {
+            let sigma_rad_s = own.max(self.estimate.sigma_rad_s);
+            self.estimate = combine(self.estimate, Estimate { omega_rad_s, sigma_rad_s }, 1.0);
+        }
+    }
+
     /// The reading of a single mark is as good as its axis holds still: what the mark does and what the camera does look alike, where it
     /// is not followed around the turn, or a hand sways as fast as it turns.
     // Not inlined: it is called in three places.
     #[inline(never)]
     fn widen_mark(&mut self, shake_px: f32) {
-        // Two parts that differ may be one.
-        if self.parts == Some(1) || self.parts == Some(2) && !self.alike {
+        if self.may_be_mark() {
             let turn_rad = self.evidence.periods.unwrap_or(0.0) * TAU;
             let shake = shake_px / (self.disc.radius_px * turn_rad) * self.omega_rad_s;
             self.estimate.sigma_rad_s = root_sum_square(self.estimate.sigma_rad_s, shake);
