@@ -1,5 +1,5 @@
-//! Random scenes of the kind that `bench trust` makes, in each of which a wrong speed was once told: none may be now. The scenes
-//! stand in `mistaken.jsonl`, with what was told.
+//! Random scenes of the kind that `bench trust` makes, in each of which a wrong speed was once told, or one far beyond its error
+//! bar: none may be now. The scenes stand in `mistaken.jsonl`, with what was told.
 
 use evtach_core::Geometry;
 use evtach_host::measure::Capacity;
