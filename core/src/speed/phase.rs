@@ -14,8 +14,9 @@ use super::polar::PolarEvent;
 use crate::math::{TAU, Turn, TurnRate, larger, quick_sqrt};
 use crate::rotors::Disc;
 
-/// Rings between centre and rim, each for both polarities.
-const RINGS: usize = 8;
+/// Rings between centre and rim, each for both polarities: the innermost, within a rotor's inner edge, and those that a [`scan`] tells
+/// apart.
+const RINGS: usize = super::angular::BANKS / 2 + 1;
 const BANKS: usize = 2 * RINGS;
 
 /// Phases of the rotor's pattern by ring and polarity.
