@@ -35,6 +35,9 @@ pub struct Args {
     /// Only these evaluations: all of them take hours.
     #[arg(long, value_enum)]
     only: Vec<Evaluation>,
+    /// Only cameras held like this.
+    #[arg(long, value_enum)]
+    mount: Vec<Mount>,
 }
 
 /// What is varied.
@@ -63,7 +66,10 @@ pub fn run(args: &Args) -> anyhow::Result<Report> {
     let seeds = args.seeds.unwrap_or(if quick { 2 } else { spec::SEEDS });
     let first = spec::first_seed(args.common.tuning);
     let models = spec::models(args.model);
-    let places = places(quick, &args.only);
+    let mut places = places(quick, &args.only);
+    if !args.mount.is_empty() {
+        places.retain(|place| args.mount.contains(&place.mount()));
+    }
     let jobs: Vec<Job> = (first..first + seeds)
         .flat_map(|seed| models.iter().map(move |model| (seed, *model)))
         .flat_map(|(seed, model)| {

@@ -53,7 +53,7 @@ pub fn first_seed(tuning: bool) -> u64 {
 }
 
 /// How the camera is held.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum Mount {
     /// On a tripod before a plain wall.
     Fixed,

@@ -27,6 +27,16 @@ pub enum Place {
     Quad,
 }
 
+impl Place {
+    /// How the camera is held.
+    pub const fn mount(&self) -> Mount {
+        match self {
+            Self::One { mount, .. } => *mount,
+            Self::Quad => Mount::Fixed,
+        }
+    }
+}
+
 /// Which part of the recording is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Window {
