@@ -10,6 +10,7 @@ mod verdict;
 use super::angular::AngularSums;
 use super::baseline::{Estimate, Pairs};
 use super::initial::{Ladder, Rates};
+use super::path::Path;
 use super::phase::Pattern;
 use super::polar::{PolarEvent, PolarTrack, track};
 use super::pose::{MOVING_PX_S, Pose, Sums, Tilt};
@@ -68,6 +69,8 @@ enum Stage {
 pub struct Bench {
     icp: Icp,
     sums: Sums,
+    /// The way of an axis that may have stood still, until that is decided.
+    walked: Path,
     angular: AngularSums,
     /// How the events of the window are gone through.
     even: Even,
@@ -75,8 +78,13 @@ pub struct Bench {
 
 impl Bench {
     /// Nothing on it. A constant, so that it is copied into place instead of being built on the stack.
-    pub const EMPTY: Self =
-        Self { icp: Icp::EMPTY, sums: Sums::EMPTY, angular: AngularSums::EMPTY, even: Even::EMPTY };
+    pub const EMPTY: Self = Self {
+        icp: Icp::EMPTY,
+        sums: Sums::EMPTY,
+        walked: Path::UNSET,
+        angular: AngularSums::EMPTY,
+        even: Even::EMPTY,
+    };
 
     /// Makes ready for another measurement, whatever was left half done.
     pub const fn clear(&mut self) {
@@ -184,7 +192,7 @@ impl Measurement {
         polar: &mut PolarTrack,
         bench: &mut Bench,
     ) -> bool {
-        let Bench { icp, sums, angular, even } = bench;
+        let Bench { icp, sums, walked, angular, even } = bench;
         match self.stage {
             Stage::Track => self.track(window, polar, even),
             Stage::Newton => self.newton(window, polar),
@@ -193,7 +201,7 @@ impl Measurement {
             Stage::Symmetry => self.symmetry(stated, polar, angular),
             Stage::Overtone => self.overtone(polar),
             Stage::Recovery => self.recovery(window, polar),
-            Stage::Pose => self.pose(window, sums, even),
+            Stage::Pose => self.pose(window, sums, walked, even),
             Stage::Initial => self.initial(window, icp),
             Stage::Refinement => self.refinement(window, icp),
             Stage::Further => self.further(window, icp),
@@ -265,7 +273,7 @@ impl Measurement {
     }
 
     /// Follows the rotor's pose through the window, a round at a time: second witness of the lock.
-    fn pose(&mut self, window: &Window<'_>, sums: &mut Sums, even: &mut Even) {
+    fn pose(&mut self, window: &Window<'_>, sums: &mut Sums, walked: &mut Path, even: &mut Even) {
         if self.turn == 0 {
             self.turn = 1;
             let parts = if self.alike { u32::from(self.parts.unwrap_or(1)).max(1) } else { 1 };
@@ -277,7 +285,7 @@ impl Measurement {
             let pose = if tells { pose.tilted(self.tilt.unwrap_or_default()) } else { pose };
             self.pose = if known { pose.known(self.moves(), self.sided) } else { pose };
         }
-        if !self.pose.step(window, sums, even) {
+        if !self.pose.step(window, sums, walked, even) {
             return;
         }
         self.turn = 0;

@@ -34,6 +34,9 @@ impl Path {
     /// An axis at rest and an even turn.
     pub const STILL: Self = Self { knots: Vec::new(), start_us: 0.0, step_us: 1.0, per_us: 1.0 };
 
+    /// None yet: all zeros, so that the flash holds no copy of what it lies in.
+    pub const UNSET: Self = Self { knots: Vec::new(), start_us: 0.0, step_us: 0.0, per_us: 0.0 };
+
     /// The same way through knots `step_us` apart from `start_us` on: `blocks` of them and one more.
     #[must_use]
     pub fn divided(&self, start_us: f32, step_us: f32, blocks: usize) -> Self {
@@ -57,6 +60,8 @@ impl Path {
     }
 
     /// Takes the mean place out of the path and returns it.
+    // Not inlined: it is called twice.
+    #[inline(never)]
     pub fn centre(&mut self) -> (f32, f32) {
         let n = (self.knots.len() as f32).max(1.0);
         let sum = |part: fn(&Knot) -> f32| self.knots.iter().map(part).sum::<f32>() / n;

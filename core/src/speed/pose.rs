@@ -26,8 +26,8 @@ use crate::math::{TAU, larger};
 use crate::rotors::Disc;
 use crate::store::{Even, Window};
 use blocks::{
-    BLOCK_SHARE, Block, LEAST_SHARE, MOST_FINE_WALK, MOST_WALK, WALK_PX, WALK_SINGLE_PX,
-    WALK_TWO_PX, WALK_US, Walk, correct, lapsed,
+    BLOCK_SHARE, Block, LEAST_SHARE, MOST_FINE_WALK, MOST_WALK, STILL_WALK_PX, WALK_PX,
+    WALK_SINGLE_PX, WALK_TWO_PX, WALK_US, Walk, correct, lapsed,
 };
 use schedule::{Phase, SETTLED_PX, Schedule};
 use sides::{Inverted, Sides};
@@ -59,6 +59,14 @@ const PULLED_UNDER_WAY_RAD: f32 = 0.3;
 /// Root mean square speed of the axis in px/s from which on the camera moves: a hand makes some 80, and what few events scatter by
 /// looks like 20.
 pub const MOVING_PX_S: f32 = 25.0;
+
+/// The same up to which the axis may have stood still, and its way be what looks different about blades and background: for a rotor
+/// whose blades show a shift, and for one with two, whose path is held back.
+const MAYBE_STILL_PX_S: f32 = 30.0;
+const MAYBE_STILL_TWO_PX_S: f32 = 12.0;
+/// It did where as large a share of the events is in step about an axis at rest: in a hand, and as far as that goes by so little, up to
+/// 0.98 of them are, on a tripod all and more.
+const STILL_SHARE: f32 = 0.985;
 
 /// Sums of one round.
 #[derive(Clone, Debug)]
@@ -99,6 +107,7 @@ pub struct Pose {
     omega_rad_s: f32,
     window_us: f32,
     period_us: f32,
+    parts: u32,
     harmonic: u32,
     first_harmonic: u32,
     most_harmonic: u32,
@@ -110,6 +119,10 @@ pub struct Pose {
     /// How the rotor is tilted, where that is asked.
     tilt: Option<Tilt>,
     path: Path,
+    /// Whether the axis is thought to stand still, whether that is to be decided yet, and how fast it went before, in px/s.
+    still: bool,
+    in_doubt: bool,
+    walked_px_s: f32,
     /// Blocks in a symmetry period, 0 when blocks are whole periods.
     in_period: usize,
     phases: Option<[(f32, f32, f32); BANKS]>,
@@ -154,6 +167,7 @@ impl Pose {
             omega_rad_s,
             window_us: window_us as f32,
             period_us: TAU * 1e6 / (omega_rad_s.abs() * parts as f32),
+            parts,
             harmonic,
             first_harmonic: harmonic,
             most_harmonic: MOST_HARMONIC,
@@ -166,6 +180,9 @@ impl Pose {
             },
             tilt: None,
             path: Path::STILL,
+            still: false,
+            in_doubt: false,
+            walked_px_s: 0.0,
             in_period: 0,
             phases: None,
             inverted: Inverted::UPRIGHT,
@@ -302,7 +319,13 @@ impl Pose {
     /// Weighs one more segment of the window, or looks at it, or ends a round: corrects the path and learns the template anew;
     /// `true` once all rounds are done. Cost: about 60 instructions an event that is
     /// looked at, 270 more for one of the rotor's, or half a million.
-    pub fn step(&mut self, window: &Window<'_>, sums: &mut Sums, even: &mut Even) -> bool {
+    pub fn step(
+        &mut self,
+        window: &Window<'_>,
+        sums: &mut Sums,
+        walked: &mut Path,
+        even: &mut Even,
+    ) -> bool {
         if !self.started {
             // The axis is thought to be at rest yet.
             let annulus = Annulus::of(self.disc);
@@ -326,7 +349,7 @@ impl Pose {
         }
         if core::mem::take(&mut self.trending) {
             self.slope = self.settled_trend(sums);
-        } else if !self.end_round(sums) {
+        } else if !self.end_round(sums, walked) {
             self.segment = 0;
             return false;
         } else if self.unsettled_us > 0.0 {
@@ -341,9 +364,16 @@ impl Pose {
     /// Corrects the path by what a round saw; `true` when it was the last.
     // Not inlined: flash is short.
     #[inline(never)]
-    fn end_round(&mut self, sums: &mut Sums) -> bool {
+    fn end_round(&mut self, sums: &mut Sums, walked: &mut Path) -> bool {
         let fine = self.schedule.is_fine();
         let at_low = sums.low.coherence(&sums.counts);
+        if core::mem::take(&mut self.in_doubt) && at_low < STILL_SHARE * self.coherence {
+            // It moves: the round is done again along its path.
+            self.still = false;
+            core::mem::swap(&mut self.path, walked);
+            self.reach_out();
+            return false;
+        }
         let blurred = at_low < SHARP_COHERENCE * self.first_coherence;
         // Path and template chase each other: too few events for so high a harmonic, or they met at a wrong one.
         let apart = fine && self.phases.is_some() && sums.in_step() < TOGETHER * at_low;
@@ -371,8 +401,9 @@ impl Pose {
             // Between the few knots of the first rounds a hand goes far.
             let coarse = self.schedule.phase() < Phase::Fine;
             let most = if coarse { MOST_WALK } else { MOST_FINE_WALK };
+            let longer = (self.path.step_us() / WALK_US).max(1.0).min(most);
             let walk = Walk {
-                step_px: self.walk_px * (self.path.step_us() / WALK_US).max(1.0).min(most),
+                step_px: if self.still { STILL_WALK_PX } else { self.walk_px * longer },
                 coherence: self.coherence,
                 harmonic: self.harmonic,
                 radius_px: self.disc.radius_px,
@@ -415,15 +446,46 @@ impl Pose {
         let under_way = corrected && moved_rad > under_way_rad;
         if self.schedule.advance(if sharper { f32::MAX } else { moved_px }, under_way) {
             self.divide();
-            let moves = self.drift_px_s() > MOVING_PX_S;
-            if moves && self.schedule.reaches_out() && self.harmonic > self.first_harmonic {
-                // A sample leaves the path off by more than the harmonic's reach where a hand moves fast: half of it reaches
-                // farther, and all events follow it as finely.
-                self.harmonic /= 2;
-                self.phases = None;
+            if self.schedule.phase() == Phase::All && !self.tries_still(walked) {
+                self.reach_out();
             }
         }
         false
+    }
+
+    /// Whether all events are to be looked at about an axis at rest first, at the mean place of one that hardly moved: path and template
+    /// are learnt together, and what differs from blade to blade and from place to place moves the axis once a turn.
+    // Not inlined: flash is short.
+    #[inline(never)]
+    fn tries_still(&mut self, walked: &mut Path) -> bool {
+        // The shift of a single mark, which one of two may be, looks like its turn.
+        let may_be_mark = self.parts < 2 && self.sectors < 3;
+        let two = self.walk_px < WALK_PX;
+        self.walked_px_s = self.drift_px_s();
+        let most_px_s = if two { MAYBE_STILL_TWO_PX_S } else { MAYBE_STILL_PX_S };
+        if may_be_mark || self.phases.is_none() || self.walked_px_s > most_px_s {
+            return false;
+        }
+        (self.still, self.in_doubt) = (true, true);
+        walked.clone_from(&self.path);
+        let (x_px, y_px) = self.path.centre();
+        for knot in self.path.knots_mut() {
+            (knot.x_px, knot.y_px) = (x_px, y_px);
+        }
+        true
+    }
+
+    /// Goes back to half the harmonic where the axis moves and all events are looked at next.
+    // Nor this, in two places.
+    #[inline(never)]
+    fn reach_out(&mut self) {
+        let moves = self.drift_px_s() > MOVING_PX_S;
+        if moves && self.schedule.reaches_out() && self.harmonic > self.first_harmonic {
+            // A sample leaves the path off by more than the harmonic's reach where a hand moves fast: half of it reaches
+            // farther, and all events follow it as finely.
+            self.harmonic /= 2;
+            self.phases = None;
+        }
     }
 
     /// Takes the trend for the answer; `false` where there is none, and a lower harmonic may give one.

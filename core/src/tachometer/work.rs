@@ -35,7 +35,6 @@ impl Default for Work {
 /// [`Work::EMPTY`] may hold a bit, and flash a copy of it all.
 #[derive(Debug)]
 #[repr(C, u32)]
-#[expect(clippy::large_enum_variant, reason = "the larger one is the point: both share its memory")]
 pub(super) enum Scratch {
     Measure(Bench),
     Search {

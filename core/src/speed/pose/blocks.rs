@@ -24,6 +24,8 @@ pub const WALK_PX: f32 = 0.5;
 pub const WALK_TWO_PX: f32 = 0.1;
 /// The same for a rotor with a single mark, whose shift and turn look alike.
 pub const WALK_SINGLE_PX: f32 = 0.05;
+/// The same for one at rest: together its knots still go to where it is.
+pub const STILL_WALK_PX: f32 = 0.003;
 /// Turn beyond an even one from knot to knot, in rad/s: what a hand rolls, and as a share of the speed, what a motor hunts.
 const WALK_RAD_S: f32 = 0.2;
 const WALK_SHARE: f32 = 0.01;
