@@ -16,6 +16,7 @@ mod look;
 mod schedule;
 mod sides;
 mod slope;
+mod still;
 mod template;
 mod tilt;
 
@@ -59,14 +60,6 @@ const PULLED_UNDER_WAY_RAD: f32 = 0.3;
 /// Root mean square speed of the axis in px/s from which on the camera moves: a hand makes some 80, and what few events scatter by
 /// looks like 20.
 pub const MOVING_PX_S: f32 = 25.0;
-
-/// The same up to which the axis may have stood still, and its way be what looks different about blades and background: for a rotor
-/// whose blades show a shift, and for one with two, whose path is held back.
-const MAYBE_STILL_PX_S: f32 = 30.0;
-const MAYBE_STILL_TWO_PX_S: f32 = 12.0;
-/// It did where as large a share of the events is in step about an axis at rest: in a hand, and as far as that goes by so little, up to
-/// 0.98 of them are, on a tripod all and more.
-const STILL_SHARE: f32 = 0.985;
 
 /// Sums of one round.
 #[derive(Clone, Debug)]
@@ -367,10 +360,7 @@ impl Pose {
     fn end_round(&mut self, sums: &mut Sums, walked: &mut Path) -> bool {
         let fine = self.schedule.is_fine();
         let at_low = sums.low.coherence(&sums.counts);
-        if core::mem::take(&mut self.in_doubt) && at_low < STILL_SHARE * self.coherence {
-            // It moves: the round is done again along its path.
-            self.still = false;
-            core::mem::swap(&mut self.path, walked);
+        if self.moves_after_all(at_low, walked) {
             self.reach_out();
             return false;
         }
@@ -453,30 +443,8 @@ impl Pose {
         false
     }
 
-    /// Whether all events are to be looked at about an axis at rest first, at the mean place of one that hardly moved: path and template
-    /// are learnt together, and what differs from blade to blade and from place to place moves the axis once a turn.
-    // Not inlined: flash is short.
-    #[inline(never)]
-    fn tries_still(&mut self, walked: &mut Path) -> bool {
-        // The shift of a single mark, which one of two may be, looks like its turn.
-        let may_be_mark = self.parts < 2 && self.sectors < 3;
-        let two = self.walk_px < WALK_PX;
-        self.walked_px_s = self.drift_px_s();
-        let most_px_s = if two { MAYBE_STILL_TWO_PX_S } else { MAYBE_STILL_PX_S };
-        if may_be_mark || self.phases.is_none() || self.walked_px_s > most_px_s {
-            return false;
-        }
-        (self.still, self.in_doubt) = (true, true);
-        walked.clone_from(&self.path);
-        let (x_px, y_px) = self.path.centre();
-        for knot in self.path.knots_mut() {
-            (knot.x_px, knot.y_px) = (x_px, y_px);
-        }
-        true
-    }
-
     /// Goes back to half the harmonic where the axis moves and all events are looked at next.
-    // Nor this, in two places.
+    // Not inlined: it is called in two places.
     #[inline(never)]
     fn reach_out(&mut self) {
         let moves = self.drift_px_s() > MOVING_PX_S;
