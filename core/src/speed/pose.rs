@@ -112,10 +112,9 @@ pub struct Pose {
     /// How the rotor is tilted, where that is asked.
     tilt: Option<Tilt>,
     path: Path,
-    /// Whether the axis is thought to stand still, whether that is to be decided yet, and how fast it went before, in px/s.
+    /// Whether the axis is thought to stand still, and whether that is to be decided yet.
     still: bool,
     in_doubt: bool,
-    walked_px_s: f32,
     /// Blocks in a symmetry period, 0 when blocks are whole periods.
     in_period: usize,
     phases: Option<[(f32, f32, f32); BANKS]>,
@@ -175,7 +174,6 @@ impl Pose {
             path: Path::STILL,
             still: false,
             in_doubt: false,
-            walked_px_s: 0.0,
             in_period: 0,
             phases: None,
             inverted: Inverted::UPRIGHT,

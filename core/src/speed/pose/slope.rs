@@ -150,8 +150,7 @@ impl Pose {
             swing_rad_s: swing_rad_s(trend.bent),
             alpha_rad_s2,
             alpha_sigma_rad_s2,
-            // What was seen of a hand before does not go for nothing.
-            drift_px_s: if self.still { self.walked_px_s } else { self.drift_px_s() },
+            drift_px_s: self.drift_px_s(),
             unsettled_us,
         })
     }

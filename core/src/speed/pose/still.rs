@@ -23,9 +23,8 @@ impl Pose {
         // The shift of a single mark, which one of two may be, looks like its turn.
         let may_be_mark = self.parts < 2 && self.sectors < 3;
         let two = self.walk_px < WALK_PX;
-        self.walked_px_s = self.drift_px_s();
         let most_px_s = if two { MAYBE_STILL_TWO_PX_S } else { MAYBE_STILL_PX_S };
-        if may_be_mark || self.phases.is_none() || self.walked_px_s > most_px_s {
+        if may_be_mark || self.phases.is_none() || self.drift_px_s() > most_px_s {
             return false;
         }
         (self.still, self.in_doubt) = (true, true);
