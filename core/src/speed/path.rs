@@ -59,6 +59,14 @@ impl Path {
         self.step_us
     }
 
+    /// Brings all knots to their mean place.
+    pub fn rest(&mut self) {
+        let (x_px, y_px) = self.centre();
+        for knot in &mut self.knots {
+            (knot.x_px, knot.y_px) = (x_px, y_px);
+        }
+    }
+
     /// Takes the mean place out of the path and returns it.
     // Not inlined: it is called twice.
     #[inline(never)]

@@ -29,10 +29,7 @@ impl Pose {
         }
         (self.still, self.in_doubt) = (true, true);
         walked.clone_from(&self.path);
-        let (x_px, y_px) = self.path.centre();
-        for knot in self.path.knots_mut() {
-            (knot.x_px, knot.y_px) = (x_px, y_px);
-        }
+        self.path.rest();
         true
     }
 
