@@ -100,7 +100,6 @@ pub struct Pose {
     omega_rad_s: f32,
     window_us: f32,
     period_us: f32,
-    parts: u32,
     harmonic: u32,
     first_harmonic: u32,
     most_harmonic: u32,
@@ -159,7 +158,6 @@ impl Pose {
             omega_rad_s,
             window_us: window_us as f32,
             period_us: TAU * 1e6 / (omega_rad_s.abs() * parts as f32),
-            parts,
             harmonic,
             first_harmonic: harmonic,
             most_harmonic: MOST_HARMONIC,
@@ -439,19 +437,6 @@ impl Pose {
             }
         }
         false
-    }
-
-    /// Goes back to half the harmonic where the axis moves and all events are looked at next.
-    // Not inlined: it is called in two places.
-    #[inline(never)]
-    fn reach_out(&mut self) {
-        let moves = self.drift_px_s() > MOVING_PX_S;
-        if moves && self.schedule.reaches_out() && self.harmonic > self.first_harmonic {
-            // A sample leaves the path off by more than the harmonic's reach where a hand moves fast: half of it reaches
-            // farther, and all events follow it as finely.
-            self.harmonic /= 2;
-            self.phases = None;
-        }
     }
 
     /// Takes the trend for the answer; `false` where there is none, and a lower harmonic may give one.

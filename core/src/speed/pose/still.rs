@@ -4,15 +4,15 @@
 //! takes the axis round once a turn, by pixels where blocks hold many events, and the turn with it. So an axis that hardly moved
 //! is tried at rest.
 
-use super::blocks::WALK_PX;
-use super::{Path, Pose};
+use super::blocks::{WALK_PX, WALK_TWO_PX};
+use super::{MOVING_PX_S, Path, Pose};
 
 /// Root mean square speed of the axis in px/s up to which it may have stood still: of a rotor whose blades show a shift, and of one
 /// with two, whose path is held back.
 const MAYBE_STILL_PX_S: f32 = 30.0;
 const MAYBE_STILL_TWO_PX_S: f32 = 12.0;
-/// It did where as large a share of the events is in step about an axis at rest: in a hand, and as far as that goes by so little, up to
-/// 0.98 of them are, on a tripod all and more.
+/// It did where as large a share of the events is in step about an axis at rest as along its path: on a tripod that is all and more but
+/// seldom, in a hand mostly less, but not always where two blades hardly show how it moves.
 const STILL_SHARE: f32 = 0.985;
 
 impl Pose {
@@ -21,7 +21,7 @@ impl Pose {
     #[inline(never)]
     pub(super) fn tries_still(&mut self, walked: &mut Path) -> bool {
         // The shift of a single mark, which one of two may be, looks like its turn.
-        let may_be_mark = self.parts < 2 && self.sectors < 3;
+        let may_be_mark = self.walk_px < WALK_TWO_PX;
         let two = self.walk_px < WALK_PX;
         let most_px_s = if two { MAYBE_STILL_TWO_PX_S } else { MAYBE_STILL_PX_S };
         if may_be_mark || self.phases.is_none() || self.drift_px_s() > most_px_s {
@@ -42,5 +42,18 @@ impl Pose {
             core::mem::swap(&mut self.path, walked);
         }
         moves
+    }
+
+    /// Goes back to half the harmonic where the axis moves and all events are looked at next.
+    // Nor this.
+    #[inline(never)]
+    pub(super) fn reach_out(&mut self) {
+        let moves = self.drift_px_s() > MOVING_PX_S;
+        if moves && self.schedule.reaches_out() && self.harmonic > self.first_harmonic {
+            // A sample leaves the path off by more than the harmonic's reach where a hand moves fast: half of it reaches
+            // farther, and all events follow it as finely.
+            self.harmonic /= 2;
+            self.phases = None;
+        }
     }
 }
