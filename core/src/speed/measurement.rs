@@ -308,7 +308,7 @@ impl Measurement {
                 self.alpha_rad_s2 = Some(found.alpha_rad_s2);
             }
         }
-        if !self.has_edges(window.ignores_polarity) {
+        if !self.has_edges(window.ignores_polarity) || self.strayed() {
             return self.refuse(Reason::Ambiguous);
         }
         if !self.follows {

@@ -51,7 +51,7 @@ const TOGETHER: f32 = 0.75;
 /// Phase at the rim, in radians of a doubled harmonic, by which the path may still move when it is doubled.
 const MOST_OFF_RAD: f32 = 1.0;
 /// Phase at the rim by which a correction moves a path that has not arrived: one correction turns a knot by one radian at most.
-const UNDER_WAY_RAD: f32 = 0.9;
+const UNDER_WAY_RAD: f32 = 0.5;
 /// Both, in the rounds that look at all events, where some of them had been taken for the wrong polarity and pulled the path aside: it is
 /// learnt together with the template, so each round does a part only of what is left.
 const PULLED_OFF_RAD: f32 = 0.5;
@@ -252,6 +252,8 @@ impl Pose {
     /// How sharply the events show the rotor's edges, in pixels half-way to the rim: the width of what they would be
     /// scattered over evenly.
     #[must_use]
+    // Not inlined: flash is short.
+    #[inline(never)]
     pub fn sharpness_px(&self) -> f32 {
         0.5 * self.disc.radius_px / (self.harmonic as f32 * self.coherence.max(LEAST_SHARE))
     }

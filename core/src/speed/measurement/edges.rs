@@ -28,6 +28,8 @@ const LEAST_JITTER_S: f32 = 40e-6;
 const MOST_SCATTER_RAD: f32 = 0.8;
 /// The same beyond which it leaves no edge: half an octave past the harmonic that it shows best.
 const NO_EDGE_RAD: f32 = 1.41;
+/// Share of the speed that it swings by within a window where a motor hunts: what a hand makes of a mark at 1500 rpm is half of that.
+const HUNTING: f32 = 0.01;
 /// Blur that a jitter of one pixel makes as the pose measures it, where the harmonic rises by doubling: up to half an octave
 /// past the best, where 1 / (m exp(-m^2 / 2)) is 1.9.
 const BLUR_OF_JITTER: f32 = 1.9;
@@ -36,12 +38,16 @@ impl Measurement {
     /// Whether jitter may scatter the blades' edges over so much of their distance that a registration matches noise: no overtone is
     /// left of them. Then the phase alone tells, by all events of the window; but not where a neighbour of the harmonic may keep
     /// step alone, as it does about the centre of a small rotor.
+    // Not inlined: flash is short.
+    #[inline(never)]
     pub(super) fn registers(&self) -> bool {
         let in_step_alone = self.doubted() || self.disc.radius_px < SMALL_PX;
         self.scatter_rad() < MOST_SCATTER_RAD || self.pose.has_overtone() || in_step_alone
     }
 
     /// By how much the jitter of dim light scatters the phase that is followed: sigma scatters a phase of m w t by m w sigma.
+    // Not inlined: flash is short.
+    #[inline(never)]
     pub(super) fn scatter_rad(&self) -> f32 {
         self.harmonic as f32 * self.omega_rad_s.abs() * MOST_JITTER_S
     }
@@ -100,6 +106,15 @@ impl Measurement {
     pub(super) fn sharp(&self) -> bool {
         let blur_px = if self.doubted() { self.pose.sharpness_px() } else { self.edges_px() };
         self.too_fast_for_edges() || blur_px < self.blur_px(LEAST_BLUR, MOST_JITTER_S)
+    }
+
+    /// Whether the path of a motor that hunts, which is followed, leaves its edges blurred, and the finer harmonic that the window before
+    /// kept step with out of step: it went astray. Measured afresh, the rotor is found again.
+    pub(super) fn strayed(&self) -> bool {
+        let least_rad_s = HUNTING * self.omega_rad_s.abs();
+        self.follows
+            && self.evidence.swing_rad_s.unwrap_or_default() > least_rad_s
+            && !(self.sharp() && self.pose.has_overtone())
     }
 
     /// Whether parts that were counted show edges between one and the next, noise and all; a single mark has no next one. Two that differ may

@@ -6,7 +6,7 @@ use super::super::baseline::Estimate;
 use super::super::path::Knot;
 use super::super::statistics::{root_sum_square, student_over_normal};
 use super::super::trend::{Point, Trend};
-use super::{LEAST_SHARE, MOVING_PX_S, Pose, Sums};
+use super::{LEAST_SHARE, MOVING_PX_S, Pose, Sums, WALK_SINGLE_PX};
 use crate::limits::MAX_KNOTS;
 use crate::math::{TAU, larger, sqrt};
 use crate::store::Window;
@@ -21,6 +21,10 @@ const SLIP_CYCLES: f32 = 0.6;
 /// The same where blocks between are out of step, where it slips bit by bit; and by so many standard errors.
 const GAP_SLIP_CYCLES: f32 = 0.2;
 const GAP_SLIP_SIGMAS: f32 = 4.0;
+/// Phase by which a block may be farther off the path than all are, and the same in standard errors: beyond, the path has not arrived
+/// there, and the sine that tells how far is bent.
+const ARRIVED_RAD: f32 = 0.5;
+const ARRIVED_SIGMAS: f32 = 3.0;
 /// Shortest time that pixels take to settle where a stream begins: simulated ones of a bandwidth of 50 Hz take as long.
 const SETTLING_US: f32 = 10_000.0;
 /// The window is so many times as long at least, or all of it is believed.
@@ -112,12 +116,20 @@ impl Pose {
         let middle_us = 0.5 * unsettled_us;
         let half_us = 0.5 * self.window_us - middle_us;
         let mut points = Vec::<Point, MAX_KNOTS>::new();
+        let (mut sum, mut whole) = (0.0, f32::MIN_POSITIVE);
         for (index, block) in sums.blocks.iter().enumerate().take(count) {
-            let t_us = self.path.time_us(index, block.way());
+            let u = (self.path.time_us(index, block.way()) - middle_us) / half_us;
             let (off_rad, weight) = block.turn_rad(self.harmonic as f32).unwrap_or_default();
-            let y = self.path.at(t_us).turn_rad + off_rad;
-            let u = (t_us - middle_us) / half_us;
-            points.push(Point { u, y, weight: if u < -1.0 { 0.0 } else { weight } }).ok();
+            sum += weight * off_rad;
+            whole += weight;
+            points.push(Point { u, y: off_rad, weight: if u < -1.0 { 0.0 } else { weight } }).ok();
+        }
+        let mean_rad = sum / whole;
+        for point in &mut points {
+            if !self.arrived(point.y - mean_rad, point.weight) {
+                point.weight = 0.0;
+            }
+            point.y += self.path.at(middle_us + point.u * half_us).turn_rad;
         }
         let share = self.coherence.max(LEAST_SHARE);
         if slips(&points, TAU / self.harmonic as f32, share) {
@@ -153,6 +165,15 @@ impl Pose {
             drift_px_s: self.drift_px_s(),
             unsettled_us,
         })
+    }
+
+    /// Whether the path has arrived at a block, known by so many events in step, that is farther off it than the mean by such a turn: within
+    /// what they scatter by. That of a single mark, whose shift and turn look alike, is held back from its blocks.
+    fn arrived(&self, off_rad: f32, weight: f32) -> bool {
+        let off_rad = self.harmonic as f32 * off_rad;
+        let scatter = 0.5 / (self.coherence.max(LEAST_SHARE) * weight);
+        let most = ARRIVED_RAD * ARRIVED_RAD + ARRIVED_SIGMAS * ARRIVED_SIGMAS * scatter;
+        off_rad * off_rad < most || self.walk_px <= WALK_SINGLE_PX
     }
 
     /// Share of the window at its two ends where no block tells.
