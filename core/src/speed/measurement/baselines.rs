@@ -23,9 +23,9 @@ const FRACTIONAL: Effort = Effort { pairs: 3, ..LOCK };
 /// The same where these few deviate: scatter goes, an alias stays.
 const FRACTIONAL_AGAIN: Effort = Effort { pairs: 9, ..LOCK };
 /// The lock of a rotor that is followed: the phase tells its speed, and these bear it out, for which they need not settle as far.
-const FOLLOWING: Effort = Effort { pairs: 3, points: SLICE_POINTS / 2, settled: 0.3 };
+const FOLLOWING: Effort = Effort { pairs: 3, points: 3 * SLICE_POINTS / 8, settled: 0.5 };
 /// An alias is off by ten times what a pair of few points scatters by.
-const FRACTIONAL_FOLLOWING: Effort = Effort { pairs: 1, points: SLICE_POINTS / 4, ..FOLLOWING };
+const FRACTIONAL_FOLLOWING: Effort = Effort { pairs: 1, points: SLICE_POINTS / 4, settled: 1.0 };
 /// Where there are more events than this for each pair, more pairs are registered, up to [`crate::limits::MAX_PAIRS`].
 const PAIR_EVENTS: usize = 1_536;
 /// The same of the refinement, whose pairs are short and gain by overlapping.
