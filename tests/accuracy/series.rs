@@ -210,6 +210,7 @@ fn a_motor_that_hunts_strongly() {
         (600..604, 900.0, 4, 0.06, 4.0),
         (600..606, 1200.0, 3, 0.1, 4.0),
         (600..606, 1200.0, 3, 0.1, 6.0),
+        (607..608, 1200.0, 3, 0.1, 6.0),
     ];
     for (seeds, rpm, blades, hunting, hunting_hz) in waves {
         for seed in seeds {

@@ -21,6 +21,8 @@ const SLIP_CYCLES: f32 = 0.6;
 /// The same where blocks between are out of step, where it slips bit by bit; and by so many standard errors.
 const GAP_SLIP_CYCLES: f32 = 0.2;
 const GAP_SLIP_SIGMAS: f32 = 4.0;
+/// Blocks from the one at an end to the next in step beyond which it is alone.
+const LONE_GAP: usize = 2;
 /// Phase by which a block may be farther off the path than all are, and the same in standard errors: beyond, the path has not arrived
 /// there, and the sine that tells how far is bent.
 const ARRIVED_RAD: f32 = 0.5;
@@ -81,6 +83,21 @@ fn slips(points: &[Point], cycle_rad: f32, share: f32) -> bool {
     false
 }
 
+/// A block alone at an end, behind a gap over which the path may have slipped by less than [`slips`] can tell, is borne out by none: left out.
+fn leave_lone_ends(points: &mut [Point]) {
+    // Twice about: each end comes first once.
+    for _ in 0..2 {
+        points.reverse();
+        let mut known = points.iter().enumerate().filter(|(_, point)| point.weight > 0.0);
+        if let (Some((end, _)), Some((beside, _))) = (known.next(), known.next())
+            && beside - end > LONE_GAP
+            && let Some(point) = points.get_mut(end)
+        {
+            point.weight = 0.0;
+        }
+    }
+}
+
 impl Pose {
     /// Time that pixels take to tell edges rightly where the stream begins with the window: until each has seen one, and a slow one
     /// has got used to the light.
@@ -92,6 +109,8 @@ impl Pose {
 
     /// The trend of the turn, where pixels may not have settled at first: what they tell meanwhile is believed where the rest bears it out
     /// and it tells more. [`Self::slope`] is the trend through all blocks.
+    // Not inlined, for the device's flash.
+    #[inline(never)]
     pub(super) fn settled_trend(&self, sums: &Sums) -> Option<Slope> {
         let settled = self.trend_after(self.unsettled_us, sums);
         let (Some(all), Some(settled)) = (self.slope, settled) else {
@@ -134,6 +153,10 @@ impl Pose {
         let share = self.coherence.max(LEAST_SHARE);
         if slips(&points, TAU / self.harmonic as f32, share) {
             return None;
+        }
+        // A single mark is in step now and then.
+        if self.walk_px > WALK_SINGLE_PX {
+            leave_lone_ends(&mut points);
         }
         // Blocks a period apart see the same pixels, unless the axis wanders: what tells more exactly.
         let folded = periods >= FOLDED_PERIODS && self.in_period > 1;
@@ -246,5 +269,19 @@ mod tests {
             !slips(&points(part_rad, 0, 0.01), CYCLE_RAD, 0.9),
             "they follow a motor that hunts"
         );
+    }
+    #[test]
+    fn a_block_alone_at_an_end_is_left_out_behind_two_that_are_out_of_step() {
+        for (gap, left) in [(1, 40), (2, 39)] {
+            for end in [0, 39] {
+                let mut points = points(0.0, 0, 0.01);
+                let beside = if end == 0 { 1..1 + gap } else { 39 - gap..39 };
+                points[beside].iter_mut().for_each(|point| point.weight = 0.0);
+                leave_lone_ends(&mut points);
+                assert_eq!(points.iter().filter(|point| point.weight > 0.0).count(), left - gap);
+                assert_eq!(points[end].weight > 0.0, left == 40);
+            }
+        }
+        leave_lone_ends(&mut []);
     }
 }
