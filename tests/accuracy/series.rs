@@ -199,21 +199,19 @@ fn a_motor_that_hunts() {
 }
 
 /// So strong ones that the path may stray, or not arrive at the window's ends: the speed may be refused, but not told wrong.
+/// Seeds that were told wrong before, or that thresholds were tried with.
 #[test]
 fn a_motor_that_hunts_strongly() {
     let waves = [
-        (295..296, 300.0, 3, 0.05, 1.5),
-        (295..296, 300.0, 3, 0.03, 1.5),
-        (295..296, 2000.0, 2, 0.05, 5.0),
-        (95..96, 1200.0, 3, 0.1, 4.0),
-        (195..196, 1200.0, 3, 0.1, 6.0),
-        (600..604, 900.0, 4, 0.06, 4.0),
-        (600..606, 1200.0, 3, 0.1, 4.0),
-        (600..606, 1200.0, 3, 0.1, 6.0),
-        (607..608, 1200.0, 3, 0.1, 6.0),
+        (&[295][..], 300.0, 3, 0.05, 1.5),
+        (&[295], 300.0, 3, 0.03, 1.5),
+        (&[295], 2000.0, 2, 0.05, 5.0),
+        (&[95, 602, 605], 1200.0, 3, 0.1, 4.0),
+        (&[195, 600, 605, 607], 1200.0, 3, 0.1, 6.0),
+        (&[600, 601], 900.0, 4, 0.06, 4.0),
     ];
     for (seeds, rpm, blades, hunting, hunting_hz) in waves {
-        for seed in seeds {
+        for &seed in seeds {
             let rotor = Rotor { rpm, blades, hunting, hunting_hz, ..Rotor::default() };
             let name = format!("{rpm} rpm, {} % at {hunting_hz} Hz, {seed}", 100.0 * hunting);
             check(&name, &scene(seed, vec![rotor]), false);
