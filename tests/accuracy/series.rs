@@ -200,23 +200,31 @@ fn a_motor_that_hunts() {
 
 /// So strong ones that the path may stray, or not arrive at the window's ends: the speed may be refused, but not told wrong.
 /// Seeds that were told wrong before, or that thresholds were tried with.
-#[test]
-fn a_motor_that_hunts_strongly() {
-    let waves = [
-        (&[295][..], 300.0, 3, 0.05, 1.5),
-        (&[295], 300.0, 3, 0.03, 1.5),
-        (&[295], 2000.0, 2, 0.05, 5.0),
-        (&[95, 602, 605], 1200.0, 3, 0.1, 4.0),
-        (&[195, 600, 605, 607], 1200.0, 3, 0.1, 6.0),
-        (&[600, 601], 900.0, 4, 0.06, 4.0),
-    ];
-    for (seeds, rpm, blades, hunting, hunting_hz) in waves {
-        for &seed in seeds {
-            let rotor = Rotor { rpm, blades, hunting, hunting_hz, ..Rotor::default() };
-            let name = format!("{rpm} rpm, {} % at {hunting_hz} Hz, {seed}", 100.0 * hunting);
-            check(&name, &scene(seed, vec![rotor]), false);
-        }
+fn hunts_strongly(seeds: &[u64], rpm: f64, blades: u8, hunting: f64, hunting_hz: f64) {
+    for &seed in seeds {
+        let rotor = Rotor { rpm, blades, hunting, hunting_hz, ..Rotor::default() };
+        let name = format!("{rpm} rpm, {} % at {hunting_hz} Hz, {seed}", 100.0 * hunting);
+        check(&name, &scene(seed, vec![rotor]), false);
     }
+}
+
+// Tests of their own, as these take longest and are among the last to begin.
+#[test]
+fn a_motor_that_hunts_by_three_to_six_percent() {
+    hunts_strongly(&[295], 300.0, 3, 0.05, 1.5);
+    hunts_strongly(&[295], 300.0, 3, 0.03, 1.5);
+    hunts_strongly(&[295], 2000.0, 2, 0.05, 5.0);
+    hunts_strongly(&[600, 601], 900.0, 4, 0.06, 4.0);
+}
+
+#[test]
+fn a_motor_that_hunts_by_ten_percent_at_4_hz() {
+    hunts_strongly(&[95, 602, 605], 1200.0, 3, 0.1, 4.0);
+}
+
+#[test]
+fn a_motor_that_hunts_by_ten_percent_at_6_hz() {
+    hunts_strongly(&[195, 600, 605, 607], 1200.0, 3, 0.1, 6.0);
 }
 
 /// Windows grow once to see whether what moves beside a motor turns. One that speeds up is then not locked, which is no refusal: the
