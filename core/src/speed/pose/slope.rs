@@ -85,7 +85,7 @@ fn slips(points: &[Point], cycle_rad: f32, share: f32) -> bool {
 
 /// A block alone at an end, behind a gap over which the path may have slipped by less than [`slips`] can tell, is borne out by none: left out.
 fn leave_lone_ends(points: &mut [Point]) {
-    // Twice about: each end comes first once.
+    // Reversed twice, each end comes first once, and the order stays.
     for _ in 0..2 {
         points.reverse();
         let mut known = points.iter().enumerate().filter(|(_, point)| point.weight > 0.0);
@@ -270,16 +270,20 @@ mod tests {
             "they follow a motor that hunts"
         );
     }
+
     #[test]
     fn a_block_alone_at_an_end_is_left_out_behind_two_that_are_out_of_step() {
-        for (gap, left) in [(1, 40), (2, 39)] {
-            for end in [0, 39] {
+        for end in [0, 39] {
+            for gap in [1, 2] {
                 let mut points = points(0.0, 0, 0.01);
                 let beside = if end == 0 { 1..1 + gap } else { 39 - gap..39 };
                 points[beside].iter_mut().for_each(|point| point.weight = 0.0);
-                leave_lone_ends(&mut points);
-                assert_eq!(points.iter().filter(|point| point.weight > 0.0).count(), left - gap);
-                assert_eq!(points[end].weight > 0.0, left == 40);
+                let mut left = points.clone();
+                leave_lone_ends(&mut left);
+                if gap > 1 {
+                    points[end].weight = 0.0;
+                }
+                assert_eq!(left, points, "behind {gap}");
             }
         }
         leave_lone_ends(&mut []);
