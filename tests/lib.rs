@@ -2,14 +2,16 @@
 
 pub mod visa;
 
+use std::cell::RefCell;
 use std::env;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use evtach_core::{Event, Geometry, Reading, RotorReading, Settings};
 use evtach_host::measure::{Capacity, Summary, measure_events, summarise};
 use evtach_host::recording::{self, OpenOptions, RecordingError};
-use evtach_host::synth::RotorTruth;
+use evtach_host::synth::{RotorTruth, Scene, Synthetic, generate};
 
 /// Writes a table to the test's output, past libtest, which shows what `println!` writes for failed tests only.
 pub fn show(text: &str) {
@@ -31,6 +33,31 @@ pub fn recordings(sub: &str) -> Option<PathBuf> {
         return None;
     }
     Some(folder)
+}
+
+/// What was made of the last scenes of a thread.
+const KEPT: usize = 2;
+
+thread_local! {
+    static MADE: RefCell<Vec<(Scene, Rc<Synthetic>)>> = const { RefCell::new(Vec::new()) };
+}
+
+/// What a scene in range looks like to a camera. Making it takes several times as long as measuring it, so the last ones of each test
+/// are kept: most are measured with both memories.
+///
+/// # Panics
+/// When the scene is out of range.
+#[must_use]
+pub fn made(scene: &Scene) -> Rc<Synthetic> {
+    MADE.with_borrow_mut(|kept| {
+        if let Some((_, made)) = kept.iter().find(|(known, _)| known == scene) {
+            return Rc::clone(made);
+        }
+        let made = Rc::new(generate(scene).expect("a scene in range"));
+        kept.truncate(KEPT - 1);
+        kept.insert(0, (scene.clone(), Rc::clone(&made)));
+        made
+    })
 }
 
 /// A recording in memory.

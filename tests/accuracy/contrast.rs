@@ -4,8 +4,8 @@ use evtach_core::{Event, Geometry, Polarity, Speed, Status};
 use evtach_host::measure::Capacity;
 use evtach_host::synth::presets::hand;
 use evtach_host::synth::scene::Shape;
-use evtach_host::synth::{Motion, Rotor, Scene, generate};
-use evtach_tests::{Loaded, measure, show};
+use evtach_host::synth::{Motion, Rotor, Scene};
+use evtach_tests::{Loaded, made, measure, show};
 
 /// Largest error in standard errors, and in permille.
 const LARGEST_ERROR_SIGMA: f64 = 4.0;
@@ -29,10 +29,10 @@ fn locks(rotor: Rotor, edge: f64, from_hand: bool, capacity: Capacity) -> usize 
     if from_hand {
         scene.camera = hand();
     }
-    let made = generate(&scene).expect("a scene in range");
+    let made = made(&scene);
     let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
     let column_px = rotor.x_px + edge * rotor.radius_px;
-    let events = made.events.into_iter().map(|event| before_two_tones(event, column_px)).collect();
+    let events = made.events.iter().map(|event| before_two_tones(*event, column_px)).collect();
     let (readings, _) = measure(&Loaded { geometry, events }, capacity);
     let name = format!(
         "{} blades, {} rpm, edge at {edge} radii, {}, {} memory",

@@ -4,7 +4,7 @@ use evtach_core::{Direction, Geometry, Reading, RotorReading};
 use evtach_host::measure::Capacity;
 use evtach_host::synth::presets::Preset;
 use evtach_host::synth::{Motion, Rotor, Scene, generate};
-use evtach_tests::{Loaded, measure, show};
+use evtach_tests::{Loaded, made, measure, show};
 
 /// Largest error of any reading in standard errors.
 const LARGEST_ERROR_SIGMA: f64 = 4.0;
@@ -56,9 +56,9 @@ fn tell(motion: &Motion, number: usize, reading: &Reading, found: &RotorReading)
 }
 
 fn series(name: &str, scene: &Scene, capacity: Capacity) -> Series {
-    let made = generate(scene).expect("a scene in range");
+    let events = made(scene).events.clone();
     let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
-    let (readings, _) = measure(&Loaded { geometry, events: made.events }, capacity);
+    let (readings, _) = measure(&Loaded { geometry, events }, capacity);
     let motion = Motion::new(scene);
     let name = format!("{name}, {} memory", capacity.as_str());
     let mut rotors: Vec<Vec<Told>> = scene.rotors.iter().map(|_| Vec::new()).collect();

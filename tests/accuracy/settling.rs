@@ -2,8 +2,8 @@
 
 use evtach_core::{Direction, Event, Geometry};
 use evtach_host::measure::Capacity;
-use evtach_host::synth::{Motion, Rotor, Scene, generate};
-use evtach_tests::{Loaded, measure, show};
+use evtach_host::synth::{Motion, Rotor, Scene};
+use evtach_tests::{Loaded, made, measure, show};
 
 /// Largest error in standard errors, and what these may be.
 const LARGEST_ERROR_SIGMA: f64 = 4.0;
@@ -24,9 +24,9 @@ fn first_reading(name: &str, tremor_px: f64, capacity: Capacity) {
     let rotor = Rotor { blades: 5, rpm: 1500.0, ..Rotor::default() };
     let mut scene = Scene { seed: 17, duration_ms: 150.0, rotors: vec![rotor], ..Scene::default() };
     (scene.camera.tremor_px, scene.camera.tremor_mrad) = (tremor_px, tremor_px);
-    let made = generate(&scene).expect("a scene in range");
+    let made = made(&scene);
     let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
-    let events = made.events.into_iter().map(not_settled).collect();
+    let events = made.events.iter().copied().map(not_settled).collect();
     let (readings, _) = measure(&Loaded { geometry, events }, capacity);
     let speed = readings.first().and_then(|reading| reading.rotors.first()?.speed);
     let speed = speed.expect("a speed");

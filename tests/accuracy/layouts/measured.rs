@@ -4,8 +4,8 @@ use std::ops::RangeInclusive;
 
 use evtach_core::{Direction, Geometry, Reading, Reason, RotorReading, Status};
 use evtach_host::measure::Capacity;
-use evtach_host::synth::{Rotor, Scene, Truth, generate};
-use evtach_tests::{Loaded, measure, show};
+use evtach_host::synth::{Rotor, Scene, Truth};
+use evtach_tests::{Loaded, made, measure, show};
 
 /// Largest relative error of a speed.
 const LARGEST_ERROR: f64 = 0.01;
@@ -25,10 +25,10 @@ pub struct Measured {
 }
 
 pub fn run(scene: &Scene, capacity: Capacity) -> Measured {
-    let made = generate(scene).expect("a scene in range");
+    let made = made(scene);
     let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
-    let (readings, _) = measure(&Loaded { geometry, events: made.events }, capacity);
-    Measured { truth: made.truth, readings }
+    let (readings, _) = measure(&Loaded { geometry, events: made.events.clone() }, capacity);
+    Measured { truth: made.truth.clone(), readings }
 }
 
 /// Signed speed of a reading in rpm.

@@ -7,8 +7,8 @@ use evtach_core::{Event, Geometry, Reading, Reason, Status};
 use evtach_host::measure::Capacity;
 use evtach_host::synth::presets::{Preset, hand, shaken, wall};
 use evtach_host::synth::scene::{Background, Camera, Lamp, Sensor, Shape, Vibration};
-use evtach_host::synth::{Model, Rotor, Scene, generate};
-use evtach_tests::{Loaded, measure, show};
+use evtach_host::synth::{Model, Rotor, Scene};
+use evtach_tests::{Loaded, made, measure, show};
 
 use self::measured::{all_read, at, rpm, run, scene, wide};
 
@@ -165,9 +165,9 @@ fn a_slow_one_that_starts_beside_a_fast_one() {
     let slow = at(250.0, 130.0, 50.0, -100.0);
     let both = Scene { duration_ms: 9_000.0, ..scene(71, vec![fast(), slow]) };
     for capacity in Capacity::ALL {
-        let mut events = generate(&alone).expect("a scene in range").events;
-        let behind = generate(&both).expect("a scene in range").events;
-        events.extend(behind.into_iter().map(|e| Event { t_us: e.t_us + 1_500_000, ..e }));
+        let mut events = made(&alone).events.clone();
+        let behind = made(&both);
+        events.extend(behind.events.iter().map(|e| Event { t_us: e.t_us + 1_500_000, ..*e }));
         let geometry = Geometry::new(both.width_px, both.height_px).expect("a sensor in range");
         let (readings, _) = measure(&Loaded { geometry, events }, capacity);
         let name = capacity.as_str();
