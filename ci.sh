@@ -13,8 +13,8 @@ target=thumbv7em-none-eabihf
 # A red run must be red again when it is repeated. `cargo test` by hand draws new cases each time, and so does
 # fuzz/run.sh.
 export PROPTEST_RNG_SEED=${PROPTEST_RNG_SEED:-20260101}
-# What is built only once keeps nothing for the next time.
-[ -z "${CI:-}" ] || export CARGO_INCREMENTAL=0
+# What is built only once keeps nothing for the next time, and no debugger sees it: a panic names its line all the same.
+[ -z "${CI:-}" ] || export CARGO_INCREMENTAL=0 CARGO_PROFILE_DEV_DEBUG=none
 
 as_root() {
   if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi
