@@ -35,10 +35,11 @@ pub fn recordings(sub: &str) -> Option<PathBuf> {
     Some(folder)
 }
 
-/// What was made of the last scenes of a thread.
+/// Scenes of a thread that are kept.
 const KEPT: usize = 2;
 
 thread_local! {
+    /// The last ones, and what was made of them.
     static MADE: RefCell<Vec<(Scene, Rc<Synthetic>)>> = const { RefCell::new(Vec::new()) };
 }
 
