@@ -29,6 +29,9 @@ use random::{Purpose, normal, stream};
 pub use scene::{Model, Rotor, Scene, SceneError};
 pub use truth::{RotorTruth, Truth, Verdict};
 
+/// What all pixels of a row are taken through together, in seconds: its poses stay in the processor's cache.
+const SLICE_S: f64 = 0.1;
+
 /// A synthetic recording.
 #[derive(Clone, Debug)]
 pub struct Synthetic {
@@ -63,20 +66,7 @@ pub fn generate(scene: &Scene) -> Result<Synthetic, SceneError> {
     let contrasts: Vec<f64> = scene.rotors.iter().map(|r| r.contrast).collect();
     let rows: Vec<Tray> = (0..scene.height_px)
         .into_par_iter()
-        .map(|y| {
-            let mut tray = Tray::new();
-            for x in 0..scene.width_px {
-                let mut pixel = Pixel::new(&scene.sensor, scene.seed, x, y);
-                pixel.noise(scene.sensor.noise_hz, false, &span, &mut tray);
-                if let Some(mut view) = field.view(x, y, scene.sensor.threshold) {
-                    threshold::run(&field, &mut view, &mut pixel, &span, &mut tray);
-                }
-                if !renders_rotors {
-                    edges::run(&field, &contrasts, (x, y), &mut pixel, &span, &mut tray);
-                }
-            }
-            tray
-        })
+        .map(|y| row(scene, &field, &contrasts, &span, y))
         .collect();
 
     let mut made = Vec::with_capacity(rows.iter().map(Vec::len).sum());
@@ -97,6 +87,36 @@ pub fn generate(scene: &Scene) -> Result<Synthetic, SceneError> {
     let truth = Truth::new(scene, &motion, &of_rotor, made.len() as u64, dropped);
     let events = made.into_iter().map(Made::event).collect();
     Ok(Synthetic { events, gyro: gyro_samples(scene, &motion, &span), truth })
+}
+
+/// The events of one row of pixels.
+fn row(scene: &Scene, field: &Field, contrasts: &[f64], span: &Span, y: u16) -> Tray {
+    let mut tray = Tray::new();
+    let mut pixels: Vec<_> = (0..scene.width_px)
+        .map(|x| {
+            let mut pixel = Pixel::new(&scene.sensor, scene.seed, x, y);
+            pixel.noise(scene.sensor.noise_hz, false, span, &mut tray);
+            let view = field.view(x, y, scene.sensor.threshold);
+            let run = view.map(|view| threshold::Run::new(field, view, &mut pixel));
+            (x, pixel, run)
+        })
+        .collect();
+    let end_s = span.duration_s + threshold::TAIL_S;
+    let mut until_s = 0.0;
+    while until_s < end_s {
+        until_s += SLICE_S;
+        for (_, pixel, run) in &mut pixels {
+            if let Some(run) = run {
+                run.advance(field, pixel, until_s, span, &mut tray);
+            }
+        }
+    }
+    if !field.renders_layers {
+        for (x, pixel, _) in &mut pixels {
+            edges::run(field, contrasts, (*x, y), pixel, span, &mut tray);
+        }
+    }
+    tray
 }
 
 fn hot_pixels(scene: &Scene, span: &Span) -> Tray {

@@ -1,5 +1,6 @@
 //! Where everything is at any time: the exact source of both the events and the truth.
 
+use std::array;
 use std::f64::consts::TAU;
 
 use rand::Rng as _;
@@ -198,10 +199,16 @@ impl Motion {
         sines.iter().any(|s| !s.0.is_empty()) || self.drift != [0.0; 2] || self.roll_drift != 0.0
     }
 
+    /// Whether the rotors' mount moves in the room.
+    #[must_use]
+    pub fn mount_moves(&self) -> bool {
+        !self.mount.0.is_empty()
+    }
+
     /// Whether the rotors' centres move on the sensor.
     #[must_use]
     pub fn rotors_move(&self) -> bool {
-        self.camera_moves() || !self.mount.0.is_empty()
+        self.camera_moves() || self.mount_moves()
     }
 
     /// Upper bound of the speed of any point of the image because of the camera and the mount, in pixels per second.
@@ -277,10 +284,15 @@ impl Motion {
 }
 
 /// Poses at a fixed step with linear interpolation: the sines are too slow to evaluate per pixel and sample.
+///
+/// Every pixel walks through all of it, so it is kept short: what stays as it is stands there once.
 #[derive(Debug)]
 pub struct PoseTable {
     from_s: f64,
-    poses: Vec<Pose>,
+    last_step: usize,
+    /// Shift, sine and cosine of [`Pose`].
+    cameras: Vec<[f64; 4]>,
+    mounts: Vec<[f64; 2]>,
     speeds: Vec<f64>,
 }
 
@@ -290,45 +302,51 @@ impl PoseTable {
     /// Speeds are kept for every so many poses.
     const PER_SPEED: usize = 20;
 
-    /// A table that covers `from_s` to `to_s`; a single pose when nothing moves.
+    /// A table that covers `from_s` to `to_s`.
     #[must_use]
     pub fn new(motion: &Motion, from_s: f64, to_s: f64) -> Self {
-        if !motion.rotors_move() {
-            return Self { from_s, poses: vec![motion.pose(0.0)], speeds: vec![0.0] };
-        }
         let steps = ((to_s - from_s) / Self::STEP_S).ceil() as usize + 2;
         let at = |i: usize| from_s + i as f64 * Self::STEP_S;
-        let poses = (0..steps).map(|i| motion.pose(at(i))).collect();
-        let speeds = (0..steps.div_ceil(Self::PER_SPEED) + 1)
-            .map(|i| motion.image_speed(at(i * Self::PER_SPEED)))
-            .collect();
-        Self { from_s, poses, speeds }
+        let poses = |moves: bool| (0..if moves { steps } else { 1 }).map(|i| motion.pose(at(i)));
+        let cameras = poses(motion.camera_moves());
+        let mounts = poses(motion.mount_moves());
+        let speeds = (0..steps.div_ceil(Self::PER_SPEED) + 1).map(|i| at(i * Self::PER_SPEED));
+        Self {
+            from_s,
+            last_step: steps - 2,
+            cameras: cameras.map(|p| [p.shift[0], p.shift[1], p.sin, p.cos]).collect(),
+            mounts: mounts.map(|p| p.mount).collect(),
+            speeds: speeds.map(|t_s| motion.image_speed(t_s)).collect(),
+        }
     }
 
     /// The pose at a time.
     #[must_use]
+    #[inline]
     pub fn at(&self, t_s: f64) -> Pose {
-        let [only] = self.poses.as_slice() else {
-            let place = ((t_s - self.from_s) / Self::STEP_S).max(0.0);
-            let i = (place as usize).min(self.poses.len() - 2);
-            let f = place - i as f64;
-            let (a, b) = (&self.poses[i], &self.poses[i + 1]);
-            let mix = |a: f64, b: f64| a + (b - a) * f;
-            return Pose {
-                shift: [mix(a.shift[0], b.shift[0]), mix(a.shift[1], b.shift[1])],
-                sin: mix(a.sin, b.sin),
-                cos: mix(a.cos, b.cos),
-                mount: [mix(a.mount[0], b.mount[0]), mix(a.mount[1], b.mount[1])],
-            };
-        };
-        *only
+        let place = ((t_s - self.from_s) / Self::STEP_S).max(0.0);
+        let step = (place as usize).min(self.last_step);
+        let share = place - step as f64;
+        let [x, y, sin, cos] = between(&self.cameras, step, share);
+        Pose { shift: [x, y], sin, cos, mount: between(&self.mounts, step, share) }
     }
 
     /// Speed of the image around a time, in pixels per second; 0 when nothing moves.
     #[must_use]
+    #[inline]
     pub fn speed(&self, t_s: f64) -> f64 {
         let i = ((t_s - self.from_s) / (Self::STEP_S * Self::PER_SPEED as f64)).max(0.0) as usize;
         let last = self.speeds.len() - 1;
         self.speeds[i.min(last)].max(self.speeds[(i + 1).min(last)])
     }
+}
+
+/// What lies between two entries of a table, or its only one.
+#[inline]
+fn between<const N: usize>(table: &[[f64; N]], step: usize, share: f64) -> [f64; N] {
+    if let [only] = table {
+        return *only;
+    }
+    let (a, b) = (&table[step], &table[step + 1]);
+    array::from_fn(|k| a[k] + (b[k] - a[k]) * share)
 }
