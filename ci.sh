@@ -57,11 +57,10 @@ step_format() {
 
 step_lint() {
   cargo clippy --workspace --all-targets -- -D warnings
-  # What only the device compiles; and with defmt, which no program here links yet.
+  # What only the device compiles; and with all that it may log, which no program here links yet.
   cargo clippy -p evtach-core -p evtach-firmware --target "$target" -- -D warnings
-  cargo clippy -p evtach-firmware --features stm32f746g-disco --target "$target" -- -D warnings
-  cargo clippy -p evtach-core -p evtach-firmware --lib --features evtach-core/defmt,evtach-firmware/defmt \
-    --target "$target" -- -D warnings
+  cargo clippy -p evtach-core -p evtach-firmware --target "$target" \
+    --features evtach-core/defmt,evtach-firmware/defmt,evtach-firmware/stm32f746g-disco -- -D warnings
 }
 
 step_test() {
@@ -116,8 +115,14 @@ step_budget() {
     echo "skipped: no qemu-system-arm"
     return
   fi
-  evtach bench cost
-  evtach bench budget
+  # Each is one core's work.
+  local cost failed=0
+  cost=$(mktemp)
+  evtach bench cost >"$cost" 2>&1 &
+  evtach bench budget || failed=1
+  wait $! || failed=1
+  cat "$cost"
+  return $failed
 }
 
 # A smoke run over the seeds, without cargo-fuzz and its instrumentation; fuzz/run.sh is the real thing.
@@ -128,14 +133,18 @@ step_fuzz() {
   fi
   # What runs for two seconds each need not be fast.
   (cd fuzz && CARGO_PROFILE_RELEASE_OPT_LEVEL=1 cargo build --release)
-  local found
-  found=$(mktemp -d)
-  for seeds in fuzz/seeds/*/; do
-    echo "fuzzing $(basename "$seeds")"
-    "fuzz/target/release/$(basename "$seeds")" "$found" "$seeds" \
-      -max_total_time=2 -rss_limit_mb=1024 -timeout=20 -artifact_prefix="$found/" 2>&1 | tail -n 1
-  done
+  printf '%s\0' fuzz/seeds/*/ | xargs -0 -n 1 -P 2 bash -c 'set -o pipefail; fuzz_from "$1"' _
 }
+
+# Two seconds from these seeds.
+fuzz_from() {
+  local program found
+  program=$(basename "$1")
+  found=$(mktemp -d)
+  "fuzz/target/release/$program" "$found" "$1" \
+    -max_total_time=2 -rss_limit_mb=1024 -timeout=20 -artifact_prefix="$found/" 2>&1 | tail -n 1 | sed "s/^/$program: /"
+}
+export -f fuzz_from
 
 # Building cargo-deny takes minutes: done where CI is set, left to people.
 step_deny() {
