@@ -36,6 +36,14 @@ step_install() {
   if ! command -v cmake >/dev/null && ! install_cmake; then
     echo "cmake could not be installed: do it by hand. Until then the tests on the emulated STM32F746G-DISCO are skipped."
   fi
+  # Takes minutes, and other steps leave a core idle now and then.
+  install_deny &
+  deny=$!
+}
+
+# Done where CI is set, left to people.
+install_deny() {
+  [ -z "${CI:-}" ] || command -v cargo-deny >/dev/null || nice cargo install cargo-deny --locked --quiet --debug
 }
 
 # What the emulated STM32F746G-DISCO is built with.
@@ -68,9 +76,10 @@ step_test() {
   # Should one not build, the test that asks for it says so.
   if command -v qemu-system-arm >/dev/null; then
     (cargo fw-qemu && cargo fw) >/dev/null 2>&1 &
+    images=$!
   fi
   cargo test --workspace
-  wait
+  [ -z "${images:-}" ] || wait "$images" || true
 }
 
 # The one that the tests have compiled, which looks for overflow. `cargo run` would compile another: without the tests, some
@@ -146,14 +155,15 @@ fuzz_from() {
 }
 export -f fuzz_from
 
-# Building cargo-deny takes minutes: done where CI is set, left to people.
 step_deny() {
+  if [ -n "${deny:-}" ]; then
+    wait "$deny"
+  else
+    install_deny
+  fi
   if ! command -v cargo-deny >/dev/null; then
-    if [ -z "${CI:-}" ]; then
-      echo "skipped: no cargo-deny (cargo install cargo-deny --locked)"
-      return
-    fi
-    cargo install cargo-deny --locked --quiet --debug
+    echo "skipped: no cargo-deny (cargo install cargo-deny --locked)"
+    return
   fi
   cargo deny check bans licenses sources
   # The emulated board has its own rules: its processor is GPL-2.0.
