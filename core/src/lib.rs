@@ -21,4 +21,4 @@ pub use event::{Event, Geometry, GyroSample, PackedEvent, Polarity};
 pub use reading::{Direction, Evidence, Frame, Reading, Reason, RotorReading, Speed, Status};
 pub use settings::{Ignored, Memory, More, Poll, Roi, Settings};
 pub use store::StoredEvent;
-pub use tachometer::{Tachometer, Work};
+pub use tachometer::{CLOCK_RESET_US, Tachometer, Work};

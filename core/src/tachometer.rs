@@ -25,6 +25,7 @@ use crate::store::{Store, WINDOW_SEGMENTS};
 use crate::tracker::Tracker;
 use rhythm::Rhythm;
 
+pub use intake::CLOCK_RESET_US;
 use work::Scratch;
 pub use work::Work;
 

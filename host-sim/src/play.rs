@@ -15,12 +15,12 @@ const PICTURE_US: u64 = 250_000;
 ///
 /// # Errors
 ///
-/// When the recording is damaged before its first event; after that, what came before it is played.
+/// When the recording is damaged before its first event; after that, what came before it is played, and the damage returned.
 pub fn play(
     recording: &mut Recording,
     instrument: &mut Instrument,
     until_us: Option<u64>,
-) -> Result<(), RecordingError> {
+) -> Result<Option<RecordingError>, RecordingError> {
     let mut settings = Settings::new(recording.geometry);
     settings.blades = instrument.preferences().blades;
     instrument.set_sensor(Sensor::Present);
@@ -28,7 +28,7 @@ pub fn play(
         let mut player =
             Player { tachometer, instrument, traffic: Traffic::default(), picture_us: None };
         let mut chunk: Vec<Event> = Vec::new();
-        let mut end_us = None;
+        let (mut end_us, mut damage) = (None, None);
         loop {
             chunk.clear();
             let read = recording.read_chunk(&mut chunk);
@@ -41,15 +41,19 @@ pub fn play(
             let cut = end_us.is_some() && chunk.is_empty();
             match read {
                 Ok(true) if !cut => {}
+                Ok(_) => break,
                 Err(error) if player.traffic.events == 0 => return Err(error),
-                Ok(_) | Err(_) => break,
+                Err(error) => {
+                    damage = Some(error);
+                    break;
+                }
             }
         }
         player.take_picture();
         if until_us.is_none() {
             player.finish();
         }
-        Ok(())
+        Ok(damage)
     })
 }
 

@@ -7,8 +7,8 @@ use super::{BASE_WINDOW_US, FIRST_WINDOW_US, Job, LONGEST_WINDOW_US, Tachometer,
 use crate::event::{Event, GyroSample, PackedEvent};
 use crate::store::{MOST_WEIGHT_LOG2, WINDOW_SEGMENTS};
 
-/// Time going back by more than this restarts the window; less is disorder, and the event is left out.
-const CLOCK_RESET_US: u64 = 1_000_000;
+/// Time going back by so many microseconds restarts the window; less is disorder, and the event is left out.
+pub const CLOCK_RESET_US: u64 = 1_000_000;
 /// Latest sensor time that is believed: beyond it (292 000 years) sums of times could overflow.
 const LATEST_US: u64 = u64::MAX / 2;
 /// Events that are packed before they are taken in.

@@ -93,6 +93,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     picker.report(recording.out_of_bounds());
     match failure {
+        // What is damaged is not wanted.
+        Some(error) if picker.is_past_end => {
+            eprintln!("note: behind what is kept, {error}");
+            Ok(ExitCode::SUCCESS)
+        }
         Some(error) => Err(error).with_context(|| name),
         None => Ok(ExitCode::SUCCESS),
     }
@@ -120,6 +125,12 @@ struct Picker {
     origin: Option<(u64, u64)>,
     seen: u64,
     written: u64,
+    /// Events whose time would lie before zero.
+    early: u64,
+    /// Events one after the other that lie so far behind the end that nothing is waited for.
+    beyond: u64,
+    /// Whether the last event lies behind the end.
+    is_past_end: bool,
     /// Inertial samples that the format has no place for.
     imu_left_out: usize,
     sorter: Option<Sorter>,
@@ -140,24 +151,28 @@ impl Picker {
             origin: None,
             seen: 0,
             written: 0,
+            early: 0,
+            beyond: 0,
+            is_past_end: false,
             imu_left_out: 0,
             sorter: ordered.then(Sorter::default),
         }
     }
 
+    /// So many events behind the end are no wrong times among right ones.
+    const MOST_BEYOND: u64 = 65_536;
+
     /// Takes in events; `false` when none behind them will be wanted.
     fn take(&mut self, events: &[Event], out: &mut Vec<Event>) -> bool {
-        let mut wanted = true;
         for event in events {
             let (first_us, shift_us) = self.origin(event.t_us);
             let since_us = event.t_us.saturating_sub(first_us);
-            if since_us >= self.end_us {
-                // Recorders write inertial samples behind the events of their time.
-                wanted = since_us - self.end_us <= LONGEST_US;
-                if wanted {
-                    continue;
-                }
-                break;
+            // Recorders write inertial samples behind the events of their time.
+            let is_beyond = since_us.saturating_sub(self.end_us) > LONGEST_US;
+            self.beyond = if is_beyond { self.beyond + 1 } else { 0 };
+            self.is_past_end = since_us >= self.end_us;
+            if self.is_past_end {
+                continue;
             }
             let inside = self.roi.is_none_or(|roi| roi.contains(event.x, event.y));
             if since_us < self.start_us || !inside {
@@ -167,7 +182,11 @@ impl Picker {
             if !(self.seen - 1).is_multiple_of(self.decimate) {
                 continue;
             }
-            let event = Event { t_us: event.t_us.saturating_sub(shift_us), ..*event };
+            let Some(t_us) = event.t_us.checked_sub(shift_us) else {
+                self.early += 1;
+                continue;
+            };
+            let event = Event { t_us, ..*event };
             self.written += 1;
             match &mut self.sorter {
                 Some(sorter) => sorter.push(event),
@@ -177,7 +196,7 @@ impl Picker {
         if let Some(sorter) = &mut self.sorter {
             sorter.release(out, false);
         }
-        wanted
+        self.beyond < Self::MOST_BEYOND
     }
 
     /// The inertial samples of the part that is wanted. They wait for the first event, which says when it begins.
@@ -201,7 +220,7 @@ impl Picker {
     fn origin(&mut self, t_us: u64) -> (u64, u64) {
         *self.origin.get_or_insert_with(|| {
             // A minute of headroom: the recording goes on from its first event.
-            let shift = self.rebase || t_us + 60_000_000 > self.latest_us;
+            let shift = self.rebase || t_us.saturating_add(60_000_000) > self.latest_us;
             if shift && !self.rebase {
                 eprintln!(
                     "note: time begins at zero, because {} cannot hold {t_us} us",
@@ -220,10 +239,16 @@ impl Picker {
     }
 
     fn report(&self, out_of_bounds: u64) {
-        let left_out = self.seen - self.written;
+        let left_out = self.seen - self.written - self.early;
         eprintln!("{} events written", self.written);
         if left_out > 0 {
             eprintln!("{left_out} events left out by --decimate");
+        }
+        if self.early > 0 {
+            eprintln!(
+                "{} events left out: their time lies before the first event's, where time begins at zero; other formats, without --rebase, hold it",
+                self.early
+            );
         }
         if self.imu_left_out > 0 {
             eprintln!(
@@ -253,6 +278,8 @@ struct Sorter {
     held: Vec<Event>,
     latest_us: u64,
     moved: u64,
+    /// Whether one came later than that.
+    gave_up: bool,
 }
 
 impl Sorter {
@@ -260,12 +287,17 @@ impl Sorter {
     const SPAN_US: u64 = 20_000;
 
     fn push(&mut self, event: Event) {
+        self.gave_up |= self.latest_us.saturating_sub(event.t_us) > Self::SPAN_US;
         self.moved += u64::from(event.t_us < self.latest_us);
         self.latest_us = self.latest_us.max(event.t_us);
         self.held.push(event);
     }
 
     fn release(&mut self, out: &mut Vec<Event>, all: bool) {
+        if self.gave_up {
+            out.append(&mut self.held);
+            return;
+        }
         if self.moved > 0 {
             // Stable: events of one microsecond stay in their order.
             self.held.sort_by_key(|event| event.t_us);
@@ -281,6 +313,18 @@ mod tests {
     use evtach_core::Polarity;
 
     use super::*;
+
+    #[test]
+    fn sorter_leaves_a_large_step_back_to_the_writer() {
+        let at = |t_us| Event { t_us, x: 0, y: 0, polarity: Polarity::On };
+        let (mut sorter, mut out) = (Sorter::default(), Vec::new());
+        for t_us in [0, 30_000, 5, 30_001] {
+            sorter.push(at(t_us));
+        }
+        sorter.release(&mut out, false);
+        let times: Vec<u64> = out.iter().map(|event| event.t_us).collect();
+        assert_eq!(times, [0, 30_000, 5, 30_001]);
+    }
 
     #[test]
     fn sorter_mends_small_steps_back() {

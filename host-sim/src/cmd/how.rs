@@ -80,10 +80,15 @@ impl How {
     }
 }
 
+/// Beyond that it tells nothing: a clock that is 10 % off.
+const MOST_SIGMA: f32 = 1e5;
+
 /// A standard deviation, which is a number and not negative.
 fn parse_sigma(text: &str) -> Result<f32, String> {
-    let sigma = text.parse().ok().filter(|sigma: &f32| sigma.is_finite() && *sigma >= 0.0);
-    sigma.ok_or_else(|| format!("\"{text}\" is no error bar; write a number from 0 on, as 0.003"))
+    let sigma = text.parse().ok().filter(|sigma: &f32| (0.0..=MOST_SIGMA).contains(sigma));
+    sigma.ok_or_else(|| {
+        format!("\"{text}\" is no error bar; write a number from 0 to {MOST_SIGMA}, as 0.003")
+    })
 }
 
 /// A region as people write it: x,y,width,height in pixels.
@@ -104,7 +109,7 @@ mod tests {
     #[test]
     fn error_bars_are_checked() {
         assert_eq!(parse_sigma("0.003"), Ok(0.003));
-        for text in ["", "-1", "nan", "inf", "a"] {
+        for text in ["", "-1", "nan", "inf", "1e6", "a"] {
             assert!(parse_sigma(text).is_err(), "{text}");
         }
     }

@@ -4,7 +4,7 @@ mod spectrum;
 mod statistics;
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context;
@@ -38,31 +38,40 @@ const TOGETHER: f64 = 0.47;
 
 /// Runs the subcommand.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    let mut failed = false;
     for (index, file) in args.files.iter().enumerate() {
-        let name = file.display().to_string();
-        let options = args.stated.into();
-        let mut recording = recording::open(file, &options).with_context(|| name.clone())?;
-        let mut statistics = Statistics::new(recording.geometry);
-        let mut imu = Vec::new();
-        let mut chunk: Vec<Event> = Vec::new();
-        let result = loop {
-            chunk.clear();
-            let more = recording.read_chunk(&mut chunk);
-            chunk.iter().for_each(|event| statistics.add(event));
-            note_imu(&mut imu, recording.take_imu());
-            match more {
-                Ok(true) => {}
-                Ok(false) => break Ok(()),
-                Err(error) => break Err(error),
-            }
-        };
-        let mut text = if index > 0 { "\n".to_owned() } else { String::new() };
-        // Writing into a string does not fail.
-        let _ = report(&mut text, &name, &recording, &statistics, &imu);
-        say(&text)?;
-        result.with_context(|| name)?;
+        if let Err(error) = about(file, &args, index > 0) {
+            eprintln!("evtach: {error:#}");
+            failed = true;
+        }
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(ExitCode::from(if failed { 2 } else { 0 }))
+}
+
+/// Tells of one file, behind a blank line where it is not the first.
+fn about(file: &Path, args: &Args, behind_another: bool) -> anyhow::Result<()> {
+    let name = file.display().to_string();
+    let options = args.stated.into();
+    let mut recording = recording::open(file, &options).with_context(|| name.clone())?;
+    let mut statistics = Statistics::new(recording.geometry);
+    let mut imu = Vec::new();
+    let mut chunk: Vec<Event> = Vec::new();
+    let result = loop {
+        chunk.clear();
+        let more = recording.read_chunk(&mut chunk);
+        chunk.iter().for_each(|event| statistics.add(event));
+        note_imu(&mut imu, recording.take_imu());
+        match more {
+            Ok(true) => {}
+            Ok(false) => break Ok(()),
+            Err(error) => break Err(error),
+        }
+    };
+    let mut text = if behind_another { "\n".to_owned() } else { String::new() };
+    // Writing into a string does not fail.
+    let _ = report(&mut text, &name, &recording, &statistics, &imu);
+    say(&text)?;
+    result.with_context(|| name)
 }
 
 /// Sum over inertial samples: number, first and last time.

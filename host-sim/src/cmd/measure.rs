@@ -8,14 +8,15 @@ use std::process::ExitCode;
 use anyhow::{Context, bail};
 use evtach_core::{Event, GyroSample, Reading};
 use evtach_host::measure::{
-    Capacity, Document, FileFacts, Ties, drain, evidence, feed, summarise, table, with_tachometer,
+    Capacity, Document, FileFacts, Ties, Timeline, drain, evidence, feed, summarise, table,
+    with_tachometer,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::how::How;
 use super::span::Span;
 use super::wait::Wait;
-use super::{in_order, say};
+use super::{in_order, note, say};
 
 /// Arguments of `evtach measure`.
 #[derive(clap::Args)]
@@ -70,61 +71,81 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
     };
     let mut readings: Vec<Reading> = Vec::new();
     let mut failure = None;
+    let mut timeline = Timeline::default();
     let ignored = with_tachometer(settings, args.how.capacity, |tachometer| {
         let (mut chunk, mut ties) = (Vec::<Event>::new(), Ties::default());
         let (mut rolls, mut wait) = (Vec::<GyroSample>::new(), Wait::default());
         let (mut origin_us, mut has_gyro) = (None, false);
         let (mut known_lost, mut measured) = (0, None::<(u64, u64)>);
+        let (mut read, mut taken, mut more) = (Vec::<Event>::new(), 0, true);
         loop {
-            chunk.clear();
-            let more = recording.read_chunk(&mut chunk).unwrap_or_else(|error| {
-                failure = Some(error);
-                false
-            });
-            facts.events += chunk.len() as u64;
-            bar.inc(chunk.len() as u64);
-            if args.how.capacity == Capacity::Full {
-                ties.order(&mut chunk, more);
+            if taken == read.len() {
+                read.clear();
+                taken = 0;
+                more = recording.read_chunk(&mut read).unwrap_or_else(|error| {
+                    failure = Some(error);
+                    false
+                });
+                bar.inc(read.len() as u64);
+                if args.how.capacity == Capacity::Full {
+                    ties.order(&mut read, more);
+                }
             }
+            let part = timeline.part(&read[taken..]);
+            chunk.clear();
+            chunk.extend_from_slice(&read[taken..taken + part]);
+            taken += part;
+            let set_back = if part == 0 { read.get(taken) } else { None };
             if let Some(first) = chunk.first() {
                 let origin_us = *origin_us.get_or_insert(first.t_us);
                 let wanted = args.span.since_us();
-                chunk.retain(|event| wanted.contains(&event.t_us.saturating_sub(origin_us)));
+                chunk.retain(|event| {
+                    wanted.contains(&timeline.at(event.t_us).saturating_sub(origin_us))
+                });
             }
+            facts.events += chunk.len() as u64;
             tachometer.lost(recording.lost() - known_lost);
             known_lost = recording.lost();
             if let (Some(first), Some(last)) = (chunk.first(), chunk.last()) {
-                let start_us = measured.map_or(first.t_us, |(start_us, _)| start_us);
-                measured = Some((start_us, last.t_us));
+                let (first_us, last_us) = (timeline.at(first.t_us), timeline.at(last.t_us));
+                measured = Some((measured.map_or(first_us, |(start_us, _)| start_us), last_us));
             }
             rolls.append(&mut args.how.rolls(&mut recording));
             has_gyro |= !rolls.is_empty();
             if args.how.gyro {
-                wait.hold(&mut chunk, &rolls, more);
+                wait.hold(&mut chunk, &rolls, more && set_back.is_none());
             }
             let mut ahead = &rolls[..];
-            feed(tachometer, &chunk, &mut ahead, |reading| readings.push(reading));
+            feed(tachometer, &chunk, &mut ahead, |reading| readings.push(timeline.laid(reading)));
             let used = rolls.len() - ahead.len();
             rolls.drain(..used);
-            if !more {
+            if let Some(next) = set_back {
+                // The device forgets a window that its clock leaves behind. What is out of order throughout will be refused.
+                if args.how.capacity == Capacity::Full && !recording.is_shuffled() {
+                    tachometer.finish();
+                    drain(tachometer, |reading| readings.push(timeline.laid(reading)));
+                }
+                timeline.set_back_to(next.t_us);
+            }
+            if !more && taken == read.len() {
                 break;
             }
         }
         args.how.note_gyro(&name, has_gyro);
         (facts.first_us, facts.last_us) = measured.unwrap_or_default();
         tachometer.finish();
-        drain(tachometer, |reading| readings.push(reading));
+        drain(tachometer, |reading| readings.push(timeline.laid(reading)));
         facts.thinned = tachometer.thinned();
         tachometer.ignored()
     });
     bar.finish_and_clear();
     if let Some(error) = failure {
-        if facts.events == 0 {
+        if bar.position() == 0 {
             return Err(error).with_context(|| name);
         }
         eprintln!("{name}: {error}; measured what came before");
     }
-    if facts.events == 0 {
+    if bar.position() == 0 {
         bail!(
             "{name}: the recording holds no events; record again, or check the format with `evtach info`"
         );
@@ -132,17 +153,12 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
     if readings.is_empty() && (!args.span.is_all() || args.how.roi.is_some()) {
         bail!("{name}: no events between --start and --end inside --roi; widen them");
     }
-    for note in &recording.side().notes {
-        eprintln!("{name}: {note}");
-    }
-    if recording.out_of_bounds() > 0 {
-        eprintln!(
-            "{name}: {} events outside the sensor left out; state its size with --geometry WxH if it is wrong",
-            recording.out_of_bounds()
-        );
-    }
+    note(&recording, &name);
     if ignored.out_of_order > 0 {
         eprintln!("{name}: {} events stepped back in time and were left out", ignored.out_of_order);
+    }
+    if timeline.is_set_back() {
+        eprintln!("{name}: {}; what follows is measured as if it came then", timeline.note());
     }
     in_order(&recording, &name)?;
     facts.lost = recording.lost() + ignored.out_of_order;

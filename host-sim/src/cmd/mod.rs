@@ -22,7 +22,13 @@ pub mod watch;
 /// Refuses to write over what is read, by whatever name.
 fn keep_apart(input: &Path, output: &Path) -> anyhow::Result<()> {
     // What is not there yet is no other's file.
-    if input.is_file() && same_file::is_same_file(input, output).unwrap_or(false) {
+    let is_same = if input == Path::new("-") {
+        let stdin = same_file::Handle::stdin().ok();
+        output.is_file() && stdin.is_some() && stdin == same_file::Handle::from_path(output).ok()
+    } else {
+        input.is_file() && same_file::is_same_file(input, output).unwrap_or(false)
+    };
+    if is_same {
         bail!(
             "{} is the same file as {}\nhelp: write to another name",
             output.display(),
@@ -30,6 +36,19 @@ fn keep_apart(input: &Path, output: &Path) -> anyhow::Result<()> {
         );
     }
     Ok(())
+}
+
+/// Says what is to be known of a recording once it is read.
+fn note(recording: &Recording, name: &str) {
+    for note in &recording.side().notes {
+        eprintln!("{name}: {note}");
+    }
+    if recording.out_of_bounds() > 0 {
+        eprintln!(
+            "{name}: {} events outside the sensor left out; state its size with --geometry WxH if it is wrong",
+            recording.out_of_bounds()
+        );
+    }
 }
 
 /// Refuses a recording, once it is read, of which no speed would be right.

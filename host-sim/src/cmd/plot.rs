@@ -5,11 +5,11 @@ use std::process::ExitCode;
 
 use anyhow::{Context, bail};
 use evtach_core::{Event, GyroSample};
-use evtach_host::measure::{FileFacts, measure_events, summarise};
+use evtach_host::measure::{FileFacts, Timeline, measure_events, summarise};
 use evtach_host::report::{Subject, heat_map, html};
 
 use super::how::How;
-use super::{deliver, in_order, keep_apart};
+use super::{deliver, in_order, keep_apart, note};
 
 /// Arguments of `evtach plot`.
 #[derive(clap::Args)]
@@ -49,7 +49,15 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             break;
         }
     }
+    note(&recording, &name);
     in_order(&recording, &name)?;
+    let mut timeline = Timeline::default();
+    let part = timeline.part(&events);
+    if let Some(next) = events.get(part) {
+        timeline.set_back_to(next.t_us);
+        eprintln!("{name}: {}; plotting what came before", timeline.note());
+        events.truncate(part);
+    }
     let (Some(first), Some(last)) = (events.first(), events.last()) else {
         bail!(
             "{name}: the recording holds no events; record again, or check the format with `evtach info`"

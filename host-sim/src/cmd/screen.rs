@@ -12,7 +12,7 @@ use evtach_host::recording;
 
 use super::span::parse_seconds;
 use super::stated::Stated;
-use super::{deliver, in_order, keep_apart};
+use super::{deliver, in_order, keep_apart, note};
 
 /// Arguments of `evtach screen`.
 #[derive(clap::Args)]
@@ -104,7 +104,11 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     let mut instrument = Instrument::new(args.preferences());
     let until_us = args.at.map(|seconds| (seconds * 1e6) as u64);
-    play(&mut recording, &mut instrument, until_us).with_context(|| name.clone())?;
+    let damage = play(&mut recording, &mut instrument, until_us).with_context(|| name.clone())?;
+    if let Some(error) = damage {
+        eprintln!("{name}: {error}; played what came before");
+    }
+    note(&recording, &name);
     in_order(&recording, &name)?;
     for action in args.actions() {
         instrument.act(action);

@@ -31,7 +31,7 @@ use args::{BackdropArgs, MotionArgs, RotorArgs, SensorArgs, set};
 pub struct Args {
     /// Recording to write; the extension gives the format; `-` is stdout.
     out: PathBuf,
-    /// Format, where the extension does not tell: evt2, evt3, dat, aedat4, csv.
+    /// Format, where the extension does not tell: evt2, evt3, dat, aedat4, csv, npy, es, spi, ev8.
     #[arg(long, value_parser = format)]
     format: Option<WriteFormat>,
     /// Where the truth goes [default: beside the recording; nowhere for `-`].

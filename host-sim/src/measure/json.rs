@@ -22,7 +22,7 @@ pub struct Document {
     pub height_px: u16,
     /// From the first to the last event.
     pub duration_s: f64,
-    /// Events in the file.
+    /// Events in the part of the file that was measured.
     pub events: u64,
     /// Events left out on purpose.
     pub thinned: u64,

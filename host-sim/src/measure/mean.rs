@@ -12,6 +12,10 @@ const OVERLAP: f64 = 3.0;
 /// Sigmas by which a slope stands out of the errors of the readings.
 const SLOPE_SIGMAS: f64 = 4.0;
 
+/// Error of the slope of a window over that of its speed, times its length: sqrt(720) over sqrt(12), as of a line and a parabola
+/// through phases that are spread evenly.
+const SLOPE_PER_SPEED: f64 = 7.746;
+
 /// What a hand rolls a camera to and fro by, in rad/s: it is in the swing that a window shows, and not in a speed relative to the room.
 const HAND_ROLL_RAD_S: f64 = 0.2;
 
@@ -90,7 +94,11 @@ impl Line {
         } else {
             let told = pieces.iter().filter_map(|p| p.speed.alpha_rad_s2).map(f64::from);
             let sum: f64 = told.sum();
-            ((sum != 0.0).then(|| sum / pieces.len() as f64), 0.0)
+            let length_s = |p: &Piece| p.length_us().max(1) as f64 * 1e-6;
+            let variance = weighted_mean(pieces, |p| {
+                SLOPE_PER_SPEED.powi(2) * p.variance() / length_s(p).powi(2)
+            });
+            ((sum != 0.0).then(|| sum / pieces.len() as f64), variance)
         };
         Self { origin_us, t_mean_s, mean_rad_s, slope_rad_s2, slope_variance }
     }
@@ -111,7 +119,8 @@ fn weighted_mean(pieces: &[Piece], of: impl Fn(&Piece) -> f64) -> f64 {
 ///
 /// A reading is the turn between its window's ends, so windows laid end to end are exact however the speed varies.
 /// What they leave open is filled in from the line through all and the reading next to it, each as far as it is
-/// known, and is as uncertain as readings scatter about that line, and as the speed swings within a window.
+/// known. That is as uncertain as readings scatter about that line, and as the speed swings within a window; and it tells nothing new,
+/// so that what the windows are off by counts for it as well.
 pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) -> Option<Speed> {
     pieces.first()?;
     let line = Line::through(pieces, span_us.start);
@@ -122,21 +131,21 @@ pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) 
 
     let clock = (f64::from(clock_sigma_ppm) * 1e-6 * line.mean_rad_s).powi(2);
     let (mut whole_s, mut turn_rad, mut turn_variance, mut by_gyro) = (0.0, 0.0, 0.0, 0.0);
-    let mut add = |length_s: f64, omega_rad_s: f64, variance: f64, frame: Frame| {
+    let mut add = |length_s: f64, counts_s: f64, omega_rad_s: f64, variance: f64, frame: Frame| {
         whole_s += length_s;
         turn_rad += length_s * omega_rad_s;
         let variance = (variance - clock).max(0.0);
         match frame {
-            Frame::Camera => turn_variance += length_s * length_s * variance,
+            Frame::Camera => turn_variance += counts_s * counts_s * variance,
             // What is left of a gyro's offset is in all of them alike.
-            Frame::Room => by_gyro += length_s * variance.sqrt(),
+            Frame::Room => by_gyro += counts_s * variance.sqrt(),
         }
     };
-    let mut reached_us = span_us.start;
     let tiles = tiles(pieces);
-    let windows = tiles.iter().map(|tile| (tile.window_us.clone(), Some(*tile)));
-    for (window_us, tile) in windows.chain([(span_us.end..span_us.end, None)]) {
-        let open_us = reached_us..window_us.start.max(reached_us);
+    let gaps = gaps(&tiles, span_us);
+    let open_s: f64 = gaps.iter().map(|gap| seconds(gap.start, gap.end)).sum();
+    let weight: f64 = tiles.iter().map(|tile| tile.weight()).sum();
+    for open_us in gaps {
         let middle_us = open_us.start.midpoint(open_us.end);
         if let Some(near) = pieces.iter().min_by_key(|p| p.middle_us().abs_diff(middle_us)) {
             let length_s = seconds(open_us.start, open_us.end);
@@ -148,13 +157,14 @@ pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) 
             let windows = (open_us.end - open_us.start) as f64 / near.length_us().max(1) as f64;
             let varies = scatter + swing / windows.max(1.0);
             let variance = varies + own * near.variance() + moved;
-            add(length_s, line.at(middle_us) + own * off(near), variance, near.speed.frame);
+            let omega_rad_s = line.at(middle_us) + own * off(near);
+            add(length_s, length_s, omega_rad_s, variance, near.speed.frame);
         }
-        if let Some(tile) = tile {
-            let length_s = tile.length_us() as f64 * 1e-6;
-            add(length_s, tile.omega_rad_s(), tile.variance(), tile.speed.frame);
-        }
-        reached_us = window_us.end;
+    }
+    for tile in tiles {
+        let length_s = tile.length_us() as f64 * 1e-6;
+        let counts_s = length_s + open_s * tile.weight() / weight;
+        add(length_s, counts_s, tile.omega_rad_s(), tile.variance(), tile.speed.frame);
     }
     let turn_variance = turn_variance + by_gyro * by_gyro;
     let sigma_rad_s = (turn_variance / (whole_s * whole_s) + clock).sqrt();
@@ -165,6 +175,18 @@ pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) 
         alpha_rad_s2: line.slope_rad_s2.map(|slope| slope as f32),
         frame: if in_room { Frame::Room } else { Frame::Camera },
     })
+}
+
+/// What windows laid end to end leave open of a span.
+fn gaps(tiles: &[&Piece], span_us: &Range<u64>) -> Vec<Range<u64>> {
+    let mut reached_us = span_us.start;
+    let starts = tiles.iter().map(|tile| tile.window_us.clone());
+    let all = starts.chain([span_us.end..span_us.end]).map(|window_us| {
+        let open_us = reached_us..window_us.start.max(reached_us);
+        reached_us = window_us.end;
+        open_us
+    });
+    all.filter(|open_us| !open_us.is_empty()).collect()
 }
 
 /// What windows laid end to end cover, and the variance of the turn in them.
@@ -308,6 +330,32 @@ mod tests {
         // Until the offset was known they were told to the camera.
         assert_eq!(told([camera, camera, room]), (17.0, camera));
         assert_eq!(told([camera, room, room]), (22.0, camera));
+    }
+
+    #[test]
+    fn time_without_a_reading_makes_nothing_surer() {
+        let piece = |start_us: u64| {
+            let speed = Speed {
+                omega_rad_s: 200.0,
+                omega_sigma_rad_s: 0.03,
+                alpha_rad_s2: None,
+                frame: Frame::Camera,
+            };
+            Piece { window_us: start_us..start_us + 150_000, speed, swing_rad_s: 0.0 }
+        };
+        for (pieces, sigma_rad_s) in
+            [(vec![piece(0)], 0.03), (vec![piece(0), piece(150_000)], 0.03 / 2.0_f32.sqrt())]
+        {
+            for until_us in [300_000, 1_000_000, 1_000_000_000] {
+                let mean = mean_speed(&pieces, &(0..until_us), 0.0).expect("readings");
+                assert!((mean.omega_sigma_rad_s / sigma_rad_s - 1.0).abs() < 0.01, "{mean:?}");
+            }
+        }
+        // An acceleration that a single window told, for a quarter of an hour.
+        let mut turning = piece(0);
+        turning.speed.alpha_rad_s2 = Some(1.0);
+        let mean = mean_speed(&[turning], &(0..1_000_000_000), 0.0).expect("a reading");
+        assert!(mean.omega_sigma_rad_s > 100.0, "{mean:?}");
     }
 
     #[test]

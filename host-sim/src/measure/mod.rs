@@ -5,6 +5,7 @@ mod mean;
 mod summary;
 mod table;
 mod ties;
+mod timeline;
 
 use std::borrow::Cow;
 
@@ -18,6 +19,7 @@ pub use json::{Document, FileFacts, ReadingRow, RotorRow, letter};
 pub use summary::{Summary, summarise};
 pub use table::{evidence, table};
 pub use ties::Ties;
+pub use timeline::Timeline;
 
 /// A PC searches among so many times as many events as the device.
 const MORE: usize = 8;

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use evtach_core::Event;
+use evtach_core::{Event, Geometry};
 use flate2::read::MultiGzDecoder;
 
 use super::error::RecordingError;
@@ -113,12 +113,16 @@ impl<R: Read> Read for Counted<R> {
 fn scan(opened: &mut Opened) -> Result<KnownSize, RecordingError> {
     let mut events: Vec<Event> = Vec::new();
     let (mut x_max, mut y_max) = (0, 0);
-    let mut any = false;
+    let (mut any, mut damage) = (false, None);
     loop {
         events.clear();
-        // What damage there is will be told when the recording is read for good.
-        let more = opened.source.read(&mut events, &mut Side::default()).unwrap_or(false);
-        for event in &events {
+        let more = opened.source.read(&mut events, &mut Side::default()).unwrap_or_else(|error| {
+            damage = Some(error);
+            false
+        });
+        // Others lie outside of any sensor, and are counted when the recording is read for good.
+        let on_sensor = |e: &&Event| e.x < Geometry::MAX_PX && e.y < Geometry::MAX_PX;
+        for event in events.iter().filter(on_sensor) {
             any = true;
             x_max = x_max.max(event.x);
             y_max = y_max.max(event.y);
@@ -126,6 +130,10 @@ fn scan(opened: &mut Opened) -> Result<KnownSize, RecordingError> {
         if !more {
             break;
         }
+    }
+    // Damage behind an event will be told when the recording is read for good.
+    if let Some(error) = damage.filter(|_| !any) {
+        return Err(error);
     }
     let found = any
         .then(|| geometry::of_extent(x_max.saturating_add(1), y_max.saturating_add(1)))

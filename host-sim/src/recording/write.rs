@@ -93,7 +93,7 @@ impl WriteFormat {
     /// The format a file name asks for: by `.evt2.raw` and the like, else by its extension (`.raw` is EVT 3.0).
     #[must_use]
     pub fn from_path(path: &Path) -> Option<Self> {
-        let name = path.file_name()?.to_str()?.to_ascii_lowercase();
+        let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
         let mut parts = name.rsplit('.');
         match (parts.next()?, parts.next()) {
             ("raw", Some("evt2")) | ("evt2", _) => Some(Self::Evt2),

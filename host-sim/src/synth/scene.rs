@@ -406,7 +406,26 @@ impl Scene {
             check(&at("hunting_hz"), r.hunting_hz, r.hunting_hz > 0.0, "above 0")?;
             check(&at("tilt_deg"), r.tilt_deg, r.tilt_deg.abs() < 80.0, "below 80")?;
             check(&at("contrast"), r.contrast, r.contrast.abs() < 10.0, "within 10")?;
+            check(&at("phase_deg"), r.phase_deg.unwrap_or(0.0), true, "a number")?;
+            check(&at("tilt_axis_deg"), r.tilt_axis_deg, true, "a number")?;
         }
+        let (camera, shake) = (&self.camera, &self.vibration);
+        for (place, value) in [
+            ("camera.tremor_px", camera.tremor_px),
+            ("camera.tremor_mrad", camera.tremor_mrad),
+            ("camera.drift_px_s", camera.drift_px_s[0]),
+            ("camera.drift_px_s", camera.drift_px_s[1]),
+            ("camera.roll_rad_s", camera.roll_rad_s),
+            ("vibration.amplitude_px", shake.amplitude_px),
+            ("vibration.second_px", shake.second_px),
+            ("vibration.frequency_hz", shake.frequency_hz.unwrap_or(1.0)),
+            ("background.contrast", self.background.contrast),
+        ] {
+            check(place, value, value.abs() <= 1e4, "within 10000")?;
+        }
+        let (ppm, sigma_ppm) = (self.clock.error_ppm.unwrap_or(0.0), self.clock.sigma_ppm);
+        check("clock.error_ppm", ppm, ppm.abs() <= 1e5, "within 100000")?;
+        check("clock.sigma_ppm", sigma_ppm, (0.0..=1e4).contains(&sigma_ppm), "0 to 10000")?;
         let s = &self.sensor;
         check("sensor.threshold", s.threshold, s.threshold > 0.01, "above 0.01")?;
         let spread = s.threshold_spread;
@@ -429,10 +448,16 @@ impl Scene {
             let f = lamp.frequency_hz;
             check("lamp.frequency_hz", f, (1.0..=5000.0).contains(&f), "1 to 5000")?;
             check("lamp.depth", lamp.depth, (0.0..=0.95).contains(&lamp.depth), "0 to 0.95")?;
+            for &share in &lamp.harmonics {
+                check("lamp.harmonics", share, share.abs() <= 1e3, "within 1000")?;
+            }
         }
         if let Some(gyro) = &self.camera.gyro {
             let f = gyro.rate_hz;
             check("camera.gyro.rate_hz", f, (1.0..=20_000.0).contains(&f), "1 to 20000")?;
+            let (noise, offset) = (gyro.noise_rad_s, gyro.offset_rad_s);
+            check("camera.gyro.noise_rad_s", noise, (0.0..=1e3).contains(&noise), "0 to 1000")?;
+            check("camera.gyro.offset_rad_s", offset, offset.abs() <= 1e3, "within 1000")?;
         }
         let grain = self.background.grain_px;
         check("background.grain_px", grain, (1.0..=200.0).contains(&grain), "1 to 200")

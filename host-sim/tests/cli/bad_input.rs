@@ -51,8 +51,10 @@ fn header_without_events() {
     for name in ["header.raw", "header.dat", "header.aedat4"] {
         assert_refused_as_bad(&measure(&write(&folder, name, &[])), "no events");
     }
-    // Two lines of text may be anything.
-    assert_refused_as_bad(&measure(&write(&folder, "header.csv", &[])), "text whose line 2 is");
+    let names = write(&folder, "header.csv", &[]);
+    assert_refused_as_bad(&measure(&names), "does not say the size of the sensor");
+    let run = evtach(&["measure", &names.display().to_string(), "--geometry", "200x160"], b"");
+    assert_refused_as_bad(&run, "no events");
 }
 
 #[test]
@@ -211,10 +213,20 @@ fn clock_that_starts_again() {
     let folder = folder();
     let first: Vec<Event> =
         rotor().iter().map(|e| Event { t_us: e.t_us + 5_000_000, ..*e }).collect();
+    let (length, lasts_us) = (first.len(), rotor().last().map_or(0, |event| event.t_us));
     let events = [first, rotor()].concat();
-    let run = measure(&csv(&folder, "again.csv", HEAD, &events));
+    let path = csv(&folder, "again.csv", HEAD, &events);
+    let run = measure(&path);
     assert_eq!(run.code, Some(0), "{}", run.stderr);
     assert_reads_the_rotor(&run.stdout);
+    let told = format!("behind event {length} the clock is set back by 5.");
+    assert!(run.stderr.contains(&told), "{told}: {}", run.stderr);
+    // The parts lie end to end.
+    let both = format!(" {:.3} s, {} events", 2e-6 * lasts_us as f64, events.len());
+    assert!(run.stdout.contains(&both), "{both}: {}", run.stdout);
+    let run = evtach(&["plot", &path.display().to_string()], b"");
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert!(run.stderr.contains(&told), "{told}: {}", run.stderr);
 }
 
 #[test]
@@ -254,6 +266,10 @@ fn one_of_two_files_fails() {
         if files.contains(&&good) {
             assert_reads_the_rotor(&run.stdout);
         }
+        let run = evtach(&["info", files[0], files[1]], b"");
+        let missing = files.iter().filter(|file| **file == &missing).count();
+        assert_eq!(run.code, Some(if missing > 0 { 2 } else { 0 }), "{}", run.stderr);
+        assert_eq!(run.stdout.matches("sensor  ").count(), 2 - missing, "{}", run.stdout);
     }
 }
 

@@ -78,6 +78,34 @@ fn a_part_of_a_recording() {
 }
 
 #[test]
+fn a_wrong_time_among_right_ones_loses_nothing_unsaid() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let mut events = rotor();
+    let right = events.len();
+    let hours_us = 10_000_000_000;
+    events[right / 10].t_us += hours_us;
+    let from = file(&folder, "in.csv", WriteFormat::Csv, &events);
+    let run = evtach(&["convert", &from, "-", "--to", "csv", "--end", "60"], b"");
+    assert_eq!(run.stdout.lines().count(), right, "{}", run.stderr);
+    // As the first one it would be where time begins.
+    events.swap(0, right / 10);
+    let from = file(&folder, "late.csv", WriteFormat::Csv, &events);
+    let run = evtach(&["convert", &from, "-", "--to", "csv", "--rebase"], b"");
+    let told = format!("{} events left out: their time lies before", right - 1);
+    assert!(run.stdout.lines().count() == 2 && run.stderr.contains(&told), "{}", run.stderr);
+}
+
+#[test]
+fn damage_behind_what_is_kept_is_no_error() {
+    let events = rotor();
+    let text = format!("{}oops\n1,2\n", lines(events.iter().copied()));
+    let run = ["convert", "-", "-", "--to", "csv", "--geometry", "200x160"];
+    assert_eq!(evtach(&run, text.as_bytes()).code, Some(2));
+    let part = evtach(&[&run[..], &["--end", "0.02"]].concat(), text.as_bytes());
+    assert_eq!(part.code, Some(0), "{}", part.stderr);
+}
+
+#[test]
 fn bad_use_is_told() {
     let folder = TempDir::new().expect("a temporary folder");
     let from = file(&folder, "in.csv", WriteFormat::Csv, &rotor());

@@ -183,7 +183,7 @@ pub struct BackdropArgs {
     /// Relative amplitudes of the lamp's 2nd, 3rd, ... harmonic.
     #[arg(long, value_delimiter = ',')]
     lamp_harmonics: Vec<f64>,
-    /// Spot that the lamp lights: x,y,radius in pixels.
+    /// Spot that the lamp lights: its place and radius in pixels, three numbers with blanks between.
     #[arg(long, value_delimiter = ',', num_args = 3, value_names = ["X", "Y", "RADIUS"])]
     lamp_spot: Vec<f64>,
     /// Something that moves without turning, as in a scene file: kind=bars,speed_px_s=1500 or kind=walker,step_hz=2.

@@ -74,7 +74,11 @@ pub fn find(head: &str, stated_unit: Option<TimeUnit>) -> Result<Layout, Recordi
         }
     }
     if rows.is_empty() {
-        return Err(not_events(layout.skip_lines + 1, head.lines().next().unwrap_or_default()));
+        // Named columns without a row: a recording without events.
+        return match names {
+            Some(_) => Ok(layout),
+            None => Err(not_events(1, head.lines().next().unwrap_or_default())),
+        };
     }
     let mut told_unit = None;
     if let Some(names) = names {
@@ -165,7 +169,8 @@ fn columns_from_names(line: &str) -> Option<Vec<(usize, Option<TimeUnit>)>> {
             if line.contains([',', ';', '\t']) { vec![part] } else { part.split(' ').collect() }
         })
         .map(|name| name.trim().trim_matches(['"', '\'']).to_ascii_lowercase())
-        .filter(|name| !name.is_empty())
+        // One without a name, as some programs put before the others, keeps its place; blanks make none.
+        .filter(|name| !name.is_empty() || line.contains([',', ';', '\t']))
         .collect();
     [
         &["t", "time", "timestamp", "timestamps", "ts"][..],
@@ -238,6 +243,9 @@ mod tests {
         let faery = find("t,x@320,y@240,on\n5,1,2,1\n", None).unwrap();
         assert_eq!((faery.columns, faery.geometry), ([0, 1, 2, 3], Geometry::new(320, 240)));
         assert_eq!(columns("t_s x y p\n0.5 1 2 1\n"), ([0, 1, 2, 3], TimeUnit::Seconds));
+        // An index without a name, and names without rows.
+        assert_eq!(columns(",t_us,x,y,p\n0,5,1,2,1\n"), ([1, 2, 3, 4], TimeUnit::Microseconds));
+        assert!(find("t,x,y,p\n", None).is_ok());
     }
 
     #[test]

@@ -13,6 +13,9 @@ const LAYOUT_BYTES: usize = 64 * 1024;
 /// Bytes decoded in one go, and the longest line.
 const CHUNK_BYTES: usize = 256 * 1024;
 
+/// What some programs begin a text with.
+const BYTE_ORDER_MARK: [u8; 3] = [0xef, 0xbb, 0xbf];
+
 /// Whether bytes look like text.
 pub(crate) fn is_text(bytes: &[u8]) -> bool {
     !bytes.is_empty()
@@ -71,6 +74,8 @@ impl Source for Text {
             let line = &bytes[start..end];
             start = end + 1;
             self.line += 1;
+            let line =
+                line.strip_prefix(&BYTE_ORDER_MARK).filter(|_| self.line == 1).unwrap_or(line);
             if self.line <= self.layout.skip_lines {
                 continue;
             }

@@ -11,6 +11,7 @@ use crate::recording::write::{Sink, Target};
 pub(crate) struct DatWriter {
     target: Target,
     bytes: Vec<u8>,
+    latest_us: u32,
 }
 
 impl DatWriter {
@@ -23,7 +24,7 @@ impl DatWriter {
             .write_all(header.as_bytes())
             .and_then(|()| target.write_all(&[TYPE_CD, RECORD_BYTES]))
             .map_err(RecordingError::Write)?;
-        Ok(Self { target, bytes: Vec::new() })
+        Ok(Self { target, bytes: Vec::new(), latest_us: 0 })
     }
 }
 
@@ -38,6 +39,15 @@ impl Sink for DatWriter {
                     advice: "let the recording begin at zero: convert with --rebase",
                 });
             };
+            // It would be read as time that wraps.
+            if self.latest_us.saturating_sub(t) > u32::MAX / 2 {
+                return Err(RecordingError::DoesNotFit {
+                    format: "DAT",
+                    what: format!("time that steps back from {} us to {t} us", self.latest_us),
+                    advice: "write another format, or a part of it with --end",
+                });
+            }
+            self.latest_us = self.latest_us.max(t);
             let address =
                 u32::from(event.x) | u32::from(event.y) << 14 | (event.polarity as u32) << 28;
             self.bytes.extend_from_slice(&t.to_le_bytes());

@@ -1,0 +1,104 @@
+//! One time for a stream whose clock is set back.
+
+use evtach_core::{CLOCK_RESET_US, Event, Reading};
+
+/// Lays the parts of a stream end to end: where its clock is set back, the tachometer begins anew, and what follows would seem to
+/// lie before, or within, what came.
+#[derive(Debug, Default)]
+pub struct Timeline {
+    /// What is added to the clock's time in this part.
+    shift_us: u64,
+    /// Latest time of the clock in this part.
+    latest_us: Option<u64>,
+    /// Where it was set back first, and by how much.
+    first: Option<(u64, u64)>,
+    events: u64,
+    set_back: u64,
+}
+
+impl Timeline {
+    /// How many of the next events come before the clock is set back: none where it is now.
+    pub fn part(&mut self, events: &[Event]) -> usize {
+        let mut latest_us = self.latest_us.unwrap_or(0);
+        let goes_back = |event: &Event| {
+            let goes_back = latest_us.saturating_sub(event.t_us) >= CLOCK_RESET_US;
+            latest_us = latest_us.max(event.t_us);
+            goes_back
+        };
+        let part = events.iter().position(goes_back).unwrap_or(events.len());
+        let latest_us = events[..part].iter().map(|event| event.t_us).max();
+        self.latest_us = self.latest_us.max(latest_us);
+        self.events += part as u64;
+        part
+    }
+
+    /// Begins the next part: the clock was set back to the time of its first event.
+    pub fn set_back_to(&mut self, t_us: u64) {
+        let by_us = self.latest_us.unwrap_or(t_us).saturating_sub(t_us);
+        self.first.get_or_insert((self.events, by_us));
+        self.shift_us = self.shift_us.saturating_add(by_us);
+        self.latest_us = Some(t_us);
+        self.set_back += 1;
+    }
+
+    /// When something of this part was, in microseconds.
+    #[must_use]
+    pub const fn at(&self, t_us: u64) -> u64 {
+        t_us.saturating_add(self.shift_us)
+    }
+
+    /// A reading of this part.
+    #[must_use]
+    pub fn laid(&self, reading: Reading) -> Reading {
+        Reading { t_us: self.at(reading.t_us), ..reading }
+    }
+
+    /// Whether the clock was set back.
+    #[must_use]
+    pub const fn is_set_back(&self) -> bool {
+        self.set_back > 0
+    }
+
+    /// Where the clock was set back, and how often.
+    #[must_use]
+    pub fn note(&self) -> String {
+        let (events, by_us) = self.first.unwrap_or_default();
+        let times = match self.set_back {
+            0 | 1 => String::new(),
+            more => format!(", the first of {more} times"),
+        };
+        let by_s = by_us as f64 * 1e-6;
+        format!("behind event {events} the clock is set back by {by_s:.3} s{times}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use evtach_core::Polarity;
+
+    use super::*;
+
+    #[test]
+    fn parts_lie_end_to_end_however_they_come() {
+        const S: u64 = 1_000_000;
+        // Half a second back is disorder, a second is another clock.
+        let times_us = [5 * S, 7 * S, 7 * S - S / 2, 6 * S, 6 * S + 10, 0, 20];
+        let events = times_us.map(|t_us| Event { t_us, x: 0, y: 0, polarity: Polarity::On });
+        let laid_us = [5 * S, 7 * S, 7 * S - S / 2, 7 * S, 7 * S + 10, 7 * S + 10, 7 * S + 30];
+        for at_once in [1, 2, 3, 7] {
+            let (mut timeline, mut laid) = (Timeline::default(), Vec::new());
+            for mut rest in events.chunks(at_once) {
+                while !rest.is_empty() {
+                    let part = timeline.part(rest);
+                    if part == 0 {
+                        timeline.set_back_to(rest[0].t_us);
+                    }
+                    laid.extend(rest[..part].iter().map(|event| timeline.at(event.t_us)));
+                    rest = &rest[part..];
+                }
+            }
+            assert_eq!(laid, laid_us, "{at_once}");
+            assert_eq!((timeline.first, timeline.set_back), (Some((3, S)), 2));
+        }
+    }
+}
