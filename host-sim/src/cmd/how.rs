@@ -27,7 +27,7 @@ pub struct How {
     #[arg(long, value_enum, default_value = "full")]
     pub capacity: Capacity,
     /// One standard deviation of the camera clock's error.
-    #[arg(long, value_name = "PPM", default_value_t = 15.0, value_parser = parse_sigma)]
+    #[arg(long, value_name = "PPM", default_value_t = 15.0, value_parser = parse_clock_ppm)]
     pub clock_ppm: f32,
     /// Take the camera's own roll out of the speed by the recording's gyro, where it has one.
     ///
@@ -37,7 +37,7 @@ pub struct How {
     pub gyro: bool,
     /// One standard deviation of the gyro's zero-rate offset; 0.003 where it was calibrated on a still camera. Unless stated, that of
     /// data sheets.
-    #[arg(long, value_name = "RAD/S", value_parser = parse_sigma)]
+    #[arg(long, value_name = "RAD/S", value_parser = parse_gyro_sigma)]
     gyro_sigma: Option<f32>,
 }
 
@@ -81,13 +81,23 @@ impl How {
 }
 
 /// Beyond that it tells nothing: a clock that is 10 % off.
-const MOST_SIGMA: f32 = 1e5;
+const MOST_CLOCK_PPM: f32 = 1e5;
+/// Fifty times that of data sheets: a gyro that is further off measures nothing.
+const MOST_GYRO_RAD_S: f32 = 10.0;
 
-/// A standard deviation, which is a number and not negative.
-fn parse_sigma(text: &str) -> Result<f32, String> {
-    let sigma = text.parse().ok().filter(|sigma: &f32| (0.0..=MOST_SIGMA).contains(sigma));
+fn parse_clock_ppm(text: &str) -> Result<f32, String> {
+    parse_sigma(text, MOST_CLOCK_PPM, "15")
+}
+
+fn parse_gyro_sigma(text: &str) -> Result<f32, String> {
+    parse_sigma(text, MOST_GYRO_RAD_S, "0.003")
+}
+
+/// A standard deviation, which is a number, not negative and at most `most`; `example` is one.
+fn parse_sigma(text: &str, most: f32, example: &str) -> Result<f32, String> {
+    let sigma = text.parse().ok().filter(|sigma: &f32| (0.0..=most).contains(sigma));
     sigma.ok_or_else(|| {
-        format!("\"{text}\" is no error bar; write a number from 0 to {MOST_SIGMA}, as 0.003")
+        format!("\"{text}\" is no error bar; write a number from 0 to {most}, as {example}")
     })
 }
 
@@ -103,14 +113,18 @@ pub fn parse_roi(text: &str) -> Result<Roi, String> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 
     #[test]
     fn error_bars_are_checked() {
-        assert_eq!(parse_sigma("0.003"), Ok(0.003));
-        for text in ["", "-1", "nan", "inf", "1e6", "a"] {
-            assert!(parse_sigma(text).is_err(), "{text}");
+        assert_eq!(parse_gyro_sigma("0.003"), Ok(0.003));
+        assert_eq!(parse_clock_ppm("100000"), Ok(1e5));
+        for text in ["", "-1", "nan", "inf", "1e30", "1e6", "a"] {
+            let told = [parse_clock_ppm(text), parse_gyro_sigma(text)].map(Result::unwrap_err);
+            assert!(told[0].contains("from 0 to 100000,"), "{}", told[0]);
+            assert!(told[1].contains("from 0 to 10,"), "{}", told[1]);
         }
     }
 

@@ -38,9 +38,9 @@ const TOGETHER: f64 = 0.47;
 
 /// Runs the subcommand.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let mut failed = false;
-    for (index, file) in args.files.iter().enumerate() {
-        if let Err(error) = about(file, &args, index > 0) {
+    let (mut told, mut failed) = (false, false);
+    for file in &args.files {
+        if let Err(error) = about(file, &args, &mut told) {
             eprintln!("evtach: {error:#}");
             failed = true;
         }
@@ -48,8 +48,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::from(if failed { 2 } else { 0 }))
 }
 
-/// Tells of one file, behind a blank line where it is not the first.
-fn about(file: &Path, args: &Args, behind_another: bool) -> anyhow::Result<()> {
+/// Tells of one file, behind a blank line where another was told of.
+fn about(file: &Path, args: &Args, told: &mut bool) -> anyhow::Result<()> {
     let name = file.display().to_string();
     let options = args.stated.into();
     let mut recording = recording::open(file, &options).with_context(|| name.clone())?;
@@ -67,10 +67,11 @@ fn about(file: &Path, args: &Args, behind_another: bool) -> anyhow::Result<()> {
             Err(error) => break Err(error),
         }
     };
-    let mut text = if behind_another { "\n".to_owned() } else { String::new() };
+    let mut text = if *told { "\n".to_owned() } else { String::new() };
     // Writing into a string does not fail.
     let _ = report(&mut text, &name, &recording, &statistics, &imu);
     say(&text)?;
+    *told = true;
     result.with_context(|| name)
 }
 

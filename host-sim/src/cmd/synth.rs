@@ -32,7 +32,7 @@ pub struct Args {
     /// Recording to write; the extension gives the format; `-` is stdout.
     out: PathBuf,
     /// Format, where the extension does not tell: evt2, evt3, dat, aedat4, csv, npy, es, spi, ev8.
-    #[arg(long, value_parser = format)]
+    #[arg(long)]
     format: Option<WriteFormat>,
     /// Where the truth goes [default: beside the recording; nowhere for `-`].
     #[arg(long)]
@@ -77,7 +77,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     let Some(format) = args.format.or_else(|| WriteFormat::from_path(&args.out)) else {
         bail!(
-            "{}: the extension names no format; end it in .raw, .dat, .aedat4 or .csv, or give --format",
+            "{}: the extension names no format; end it in .raw, .dat, .aedat4, .csv, .npy, .es, .spi or .ev8, \
+             or give --format",
             args.out.display()
         );
     };
@@ -151,10 +152,14 @@ fn report(out: &Path, format: WriteFormat, made: &Synthetic, truth: Option<&Path
 
 /// The truth file beside a recording: its name without the extensions of its format.
 fn truth_path(out: &Path) -> Option<PathBuf> {
-    let name = out.file_name()?.to_str().filter(|name| *name != "-")?;
-    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
-    let stem = stem.strip_suffix(".evt2").or_else(|| stem.strip_suffix(".evt3")).unwrap_or(stem);
-    Some(out.with_file_name(format!("{stem}.truth.json")))
+    let name = Path::new(out.file_name().filter(|name| *name != "-")?);
+    let stem = Path::new(name.file_stem()?);
+    let is_kind_of_raw = stem.extension().is_some_and(|kind| kind == "evt2" || kind == "evt3");
+    let stem = if is_kind_of_raw { stem.file_stem()? } else { stem.as_os_str() };
+    // Not through text: names need not be UTF-8.
+    let mut truth = stem.to_owned();
+    truth.push(".truth.json");
+    Some(out.with_file_name(truth))
 }
 
 fn write_truth(path: &Path, made: &Synthetic) -> anyhow::Result<()> {
@@ -167,13 +172,6 @@ fn write_truth(path: &Path, made: &Synthetic) -> anyhow::Result<()> {
         .with_context(|| format!("{}: cannot be created; choose --truth", path.display()))?;
     writeln!(file, "{}", serde_json::to_string_pretty(&value)?)?;
     Ok(())
-}
-
-fn format(text: &str) -> Result<WriteFormat, String> {
-    WriteFormat::ALL
-        .into_iter()
-        .find(|f| f.as_str() == text)
-        .ok_or_else(|| format!("{text:?} is no format; use evt2, evt3, dat, aedat4 or csv"))
 }
 
 fn scene(args: &Args) -> anyhow::Result<Scene> {
@@ -223,6 +221,17 @@ mod tests {
         let truth = |out: &str| truth_path(Path::new(out));
         assert_eq!(truth("a/fan.evt2.raw"), Some(PathBuf::from("a/fan.truth.json")));
         assert_eq!(truth("fan.v2.aedat4"), Some(PathBuf::from("fan.v2.truth.json")));
+        assert_eq!(truth("fan"), Some(PathBuf::from("fan.truth.json")));
         assert_eq!(truth("-"), None);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn names_need_not_be_utf_8() {
+        use std::ffi::OsStr;
+        use std::os::unix::ffi::OsStrExt as _;
+        let path = |bytes: &'static [u8]| Path::new(OsStr::from_bytes(bytes));
+        let truth = truth_path(path(b"a/f\xff.evt3.raw"));
+        assert_eq!(truth.as_deref(), Some(path(b"a/f\xff.truth.json")));
     }
 }

@@ -1,6 +1,7 @@
 //! The mean speed of a rotor over a recording, from readings whose windows overlap and leave gaps.
 
 use std::f64::consts::PI;
+use std::iter;
 use std::ops::Range;
 
 use evtach_core::{Frame, Reading, Speed};
@@ -181,7 +182,7 @@ pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) 
 fn gaps(tiles: &[&Piece], span_us: &Range<u64>) -> Vec<Range<u64>> {
     let mut reached_us = span_us.start;
     let starts = tiles.iter().map(|tile| tile.window_us.clone());
-    let all = starts.chain([span_us.end..span_us.end]).map(|window_us| {
+    let all = starts.chain(iter::once(span_us.end..span_us.end)).map(|window_us| {
         let open_us = reached_us..window_us.start.max(reached_us);
         reached_us = window_us.end;
         open_us

@@ -230,3 +230,28 @@ impl Write for Target {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_asks_for_a_format() {
+        let format = |name: &str| WriteFormat::from_path(Path::new(name));
+        assert_eq!(format("a/fan.evt2.RAW"), Some(WriteFormat::Evt2));
+        assert_eq!(format("fan.raw"), Some(WriteFormat::Evt3));
+        assert_eq!(format("fan"), None);
+        for known in WriteFormat::ALL {
+            assert_eq!(format(&format!("fan.{}", known.as_str())), Some(known));
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_name_need_not_be_utf_8() {
+        use std::ffi::OsStr;
+        use std::os::unix::ffi::OsStrExt as _;
+        let name = OsStr::from_bytes(b"f\xff.csv");
+        assert_eq!(WriteFormat::from_path(Path::new(name)), Some(WriteFormat::Csv));
+    }
+}

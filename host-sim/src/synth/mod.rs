@@ -6,6 +6,7 @@
 
 mod backdrop;
 mod blades;
+mod check;
 pub mod edges;
 mod field;
 mod made;

@@ -184,7 +184,7 @@ pub struct BackdropArgs {
     #[arg(long, value_delimiter = ',')]
     lamp_harmonics: Vec<f64>,
     /// Spot that the lamp lights: its place and radius in pixels, three numbers with blanks between.
-    #[arg(long, value_delimiter = ',', num_args = 3, value_names = ["X", "Y", "RADIUS"])]
+    #[arg(long, num_args = 3, action = clap::ArgAction::Set, allow_negative_numbers = true, value_names = ["X", "Y", "RADIUS"])]
     lamp_spot: Vec<f64>,
     /// Something that moves without turning, as in a scene file: kind=bars,speed_px_s=1500 or kind=walker,step_hz=2.
     #[arg(long = "mover", value_name = "KEY=VALUE,...", value_parser = mover)]
@@ -311,8 +311,10 @@ fn overlay(base: Map<String, Value>, text: &str) -> Result<Value, String> {
             .map(|unit| format!("{key}{unit}"))
             .find(|name| map.contains_key(name));
         let value = value.trim();
-        let value = value.parse::<f64>().map_or_else(
-            |_| Value::from(value),
+        // JSON has neither NaN nor infinity: as numbers they would become null, which means "not given".
+        let number = value.parse::<f64>().ok().filter(|number| number.is_finite());
+        let value = number.map_or_else(
+            || Value::from(value),
             // Whole numbers stay whole: blade counts are integers.
             |number| value.parse::<u64>().map_or_else(|_| Value::from(number), Value::from),
         );
@@ -360,6 +362,25 @@ mod tests {
         assert!(rotor("blades=2.5").is_err());
         assert!(rotor("wings=2").unwrap_err().contains("wings"));
         assert!(rotor("blades").is_err());
+        for text in ["phase=nan", "hub=inf", "x=-inf"] {
+            assert!(rotor(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_lamp_spot_is_three_numbers() {
+        use clap::{Args as _, FromArgMatches as _};
+        let spot = |flags: &[&str]| {
+            let command = BackdropArgs::augment_args(clap::Command::new("synth"));
+            let matches = command.try_get_matches_from([&["synth"][..], flags].concat()).ok()?;
+            Some(BackdropArgs::from_arg_matches(&matches).ok()?.lamp_spot)
+        };
+        assert_eq!(spot(&["--lamp-spot", "-10", "120", "60.5"]), Some(vec![-10.0, 120.0, 60.5]));
+        assert_eq!(spot(&[]), Some(Vec::new()));
+        assert_eq!(spot(&["--lamp-spot", "1,2", "3", "4"]), None);
+        assert_eq!(spot(&["--lamp-spot", "1", "2"]), None);
+        let twice = ["--lamp-spot", "1", "2", "3", "--lamp-spot", "1", "2", "3"];
+        assert_eq!(spot(&twice), None);
     }
 
     #[test]

@@ -161,7 +161,8 @@ impl Arrays {
         };
         let t = number(0);
         Ok(Event {
-            t_us: microseconds(t, self.unit).ok_or_else(|| format!("the time is {t:?}"))?,
+            t_us: microseconds(t, self.unit)
+                .ok_or_else(|| format!("the time is {}", t.as_f64()))?,
             x: pixel(number(1)),
             y: pixel(number(2)),
             polarity: if number(3).as_f64() > 0.0 { Polarity::On } else { Polarity::Off },
