@@ -14,6 +14,18 @@ pub enum Place {
     Record(u64),
 }
 
+impl Place {
+    /// What to do about damage here.
+    const fn what_to_do(self) -> &'static str {
+        match self {
+            Self::Byte(0) | Self::Line(0 | 1) | Self::Record(0) => {
+                "nothing comes before it; check what wrote the file"
+            }
+            _ => "what came before is good; cut the file there with `evtach convert --end`",
+        }
+    }
+}
+
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -79,7 +91,7 @@ pub enum RecordingError {
     },
     /// The content contradicts its format.
     #[error(
-        "{format}, {place}: {what}\nhelp: what came before is good; cut the file there with `evtach convert --end`, or record again"
+        "{format}, {place}: {what}\nhelp: {}, or record again", .place.what_to_do()
     )]
     Damaged {
         /// Name of the format.
@@ -99,4 +111,23 @@ pub enum RecordingError {
         /// What to do.
         advice: &'static str,
     },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_good_before_the_first_record() {
+        let told = |place| {
+            RecordingError::Damaged { format: "CSV", place, what: "x is \"a\"".to_owned() }
+                .to_string()
+        };
+        for first in [Place::Byte(0), Place::Line(1), Place::Record(0)] {
+            assert!(!told(first).contains("came before"), "{first}");
+        }
+        for later in [Place::Byte(9), Place::Line(2), Place::Record(1)] {
+            assert!(told(later).contains("what came before is good"), "{later}");
+        }
+    }
 }

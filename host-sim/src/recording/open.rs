@@ -267,11 +267,56 @@ fn prophesee(mut input: Input, time_unit: Option<TimeUnit>) -> Result<Opened, Re
     if dat::is_dat(data) {
         return Ok(dat::open(input, header));
     }
-    if csv::is_text(data) {
+    // A text may end behind its size: then it has no events.
+    let size_only = data.is_empty() && bytes.starts_with(b"%geometry:");
+    if csv::is_text(data) || size_only {
         return csv::open(input, time_unit);
     }
     Err(RecordingError::Unknown {
         found: "a Prophesee header without an \"evt\" or \"format\" line".to_owned(),
         advice: "add the line \"% evt 2.0\" or \"% evt 3.0\" to its header, whichever the camera wrote",
     })
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test")]
+mod tests {
+    use super::*;
+
+    fn recognised(text: &'static str) -> Opened {
+        let input = Input::new(Box::new(text.as_bytes()));
+        recognise(input, Path::new("-"), &OpenOptions::default()).unwrap()
+    }
+
+    fn scanned(text: &'static str) -> Result<KnownSize, RecordingError> {
+        scan(&mut recognised(text))
+    }
+
+    #[test]
+    fn damage_before_any_event_is_told_instead_of_the_missing_size() {
+        let error = scanned("t,x,y,p\n-5,1,2,1\n6,1,2,0\n").unwrap_err();
+        assert!(error.to_string().starts_with("CSV, line 2: the time is \"-5\""), "{error}");
+        // Behind an event it is told when that has been read.
+        assert!(scanned("t,x,y,p\n5,1,2,1\n-6,1,2,0\n").is_ok());
+        let error = scanned("t,x,y,p\n").unwrap_err();
+        assert!(matches!(error, RecordingError::NoGeometry { .. }), "{error}");
+    }
+
+    #[test]
+    fn a_coordinate_that_no_sensor_has_does_not_count_for_the_size() {
+        let text = "t,x,y,p\n5,300,200,1\n6,-1,3,0\n7,3,2048,0\n8,5,100,0\n";
+        let size = scanned(text).unwrap();
+        assert_eq!(Some(size.size), Geometry::new(304, 240));
+        let mut recording = Recording::new(recognised(text), &size, Progress::default());
+        let mut events = Vec::new();
+        while recording.read_chunk(&mut events).unwrap() {}
+        assert_eq!((events.len(), recording.out_of_bounds()), (2, 2));
+    }
+
+    #[test]
+    fn a_text_with_its_size_only_has_no_events() {
+        let mut opened = recognised("%geometry:640,480\n");
+        assert_eq!(opened.geometry.take().map(|known| known.size), Geometry::new(640, 480));
+        assert!(matches!(scan(&mut opened), Err(RecordingError::NoGeometry { .. })));
+    }
 }

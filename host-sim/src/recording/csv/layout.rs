@@ -31,7 +31,7 @@ pub fn fields(line: &str) -> impl Iterator<Item = &str> {
 
 /// Finds the layout from the first lines of a file; the unit of its times may be stated.
 pub fn find(head: &str, stated_unit: Option<TimeUnit>) -> Result<Layout, RecordingError> {
-    let mut names: Option<Vec<(usize, Option<TimeUnit>)>> = None;
+    let mut names: Option<Vec<String>> = None;
     let mut layout = Layout {
         columns: [0, 1, 2, 3],
         unit: TimeUnit::Microseconds,
@@ -42,17 +42,20 @@ pub fn find(head: &str, stated_unit: Option<TimeUnit>) -> Result<Layout, Recordi
     let mut rows: Vec<Vec<&str>> = Vec::new();
     let mut vendor_order = false;
     for line in head.lines() {
-        let line = line.trim_start_matches('\u{feff}').trim();
+        let whole = line.trim_start_matches('\u{feff}');
+        let line = whole.trim();
         let numeric = fields(line).next().is_some_and(|field| field.parse::<f64>().is_ok());
         if rows.is_empty() && !numeric {
             layout.skip_lines += 1;
             let bare = line.trim_start_matches(['#', '%']).trim();
+            // A tab in front stands behind a column without a name.
+            let named = names_in(if whole.starts_with('\t') { whole } else { bare });
             if let Some(value) = bare.strip_prefix("geometry:") {
                 layout.geometry = geometry::parse(value.trim());
                 vendor_order = true;
-            } else if let Some(found) = columns_from_names(bare) {
+            } else if columns_from_names(&named).is_some() {
                 layout.geometry = size_from_names(bare).or(layout.geometry);
-                names = Some(found);
+                names = Some(named);
             } else if !line.is_empty() && !line.starts_with(['#', '%']) {
                 return Err(not_events(layout.skip_lines, line));
             }
@@ -73,19 +76,17 @@ pub fn find(head: &str, stated_unit: Option<TimeUnit>) -> Result<Layout, Recordi
             break;
         }
     }
-    if rows.is_empty() {
-        // Named columns without a row: a recording without events.
-        return match names {
-            Some(_) => Ok(layout),
-            None => Err(not_events(1, head.lines().next().unwrap_or_default())),
-        };
+    // What tells the columns and has no row is a recording without events.
+    if rows.is_empty() && names.is_none() && !vendor_order {
+        let first = head.lines().next().unwrap_or_default();
+        return Err(not_events(1, first.trim_start_matches('\u{feff}')));
     }
     let mut told_unit = None;
-    if let Some(names) = names {
-        for (column, found) in layout.columns.iter_mut().zip(&names) {
+    if let Some(found) = names.and_then(|names| columns_of_rows(names, &rows)) {
+        for (column, found) in layout.columns.iter_mut().zip(&found) {
             *column = found.0;
         }
-        told_unit = names[0].1;
+        told_unit = found[0].1;
     } else {
         layout.columns = if vendor_order { [3, 0, 1, 2] } else { columns_from_rows(&rows) };
         let order = order(layout.columns);
@@ -97,7 +98,10 @@ pub fn find(head: &str, stated_unit: Option<TimeUnit>) -> Result<Layout, Recordi
     let seen = TimeUnit::from_times(&column(&rows, layout.columns[0]), f64::EPSILON);
     let (unit, sentence) = TimeUnit::settle(stated_unit, told_unit, "column", seen)?;
     layout.unit = unit;
-    layout.assumed.push(sentence);
+    // Without a row, what was seen was nothing.
+    if !rows.is_empty() || stated_unit.or(told_unit).is_some() {
+        layout.assumed.push(sentence);
+    }
     Ok(layout)
 }
 
@@ -158,20 +162,35 @@ pub fn order_from_numbers(rows: &[Vec<f64>]) -> ([usize; 4], String) {
 
 /// Whether a line names the columns.
 pub fn names_columns(line: &[u8]) -> bool {
-    std::str::from_utf8(line).is_ok_and(|line| columns_from_names(line.trim()).is_some())
+    std::str::from_utf8(line).is_ok_and(|line| columns_from_names(&names_in(line.trim())).is_some())
 }
 
-/// Columns t, x, y, p with the unit their name tells, or `None` when the line does not name all four.
-fn columns_from_names(line: &str) -> Option<Vec<(usize, Option<TimeUnit>)>> {
-    let names: Vec<String> = line
-        .split([',', ';', '\t'])
-        .flat_map(|part| {
-            if line.contains([',', ';', '\t']) { vec![part] } else { part.split(' ').collect() }
-        })
+/// Names in a line. One that is empty keeps its place, as that of the index which pandas puts in front; blanks make none.
+fn names_in(line: &str) -> Vec<String> {
+    let blanks = !line.contains([',', ';', '\t']);
+    let mut names: Vec<String> = line
+        .split(|c: char| matches!(c, ',' | ';' | '\t') || blanks && c == ' ')
         .map(|name| name.trim().trim_matches(['"', '\'']).to_ascii_lowercase())
-        // One without a name, as some programs put before the others, keeps its place; blanks make none.
-        .filter(|name| !name.is_empty() || line.contains([',', ';', '\t']))
+        .filter(|name| !(blanks && name.is_empty()))
         .collect();
+    while names.pop_if(|name| name.is_empty()).is_some() {}
+    names
+}
+
+/// Columns t, x, y, p among the fields of rows with these names. A field that is empty counts for none in a row, so where
+/// rows have too few, the names that are empty count for none either.
+fn columns_of_rows(
+    mut names: Vec<String>,
+    rows: &[Vec<&str>],
+) -> Option<Vec<(usize, Option<TimeUnit>)>> {
+    if rows.first().is_some_and(|row| row.len() < names.len()) {
+        names.retain(|name| !name.is_empty());
+    }
+    columns_from_names(&names)
+}
+
+/// Columns t, x, y, p with the unit their name tells, or `None` when not all four are named.
+fn columns_from_names(names: &[String]) -> Option<Vec<(usize, Option<TimeUnit>)>> {
     [
         &["t", "time", "timestamp", "timestamps", "ts"][..],
         &["x", "col", "column"],
@@ -243,9 +262,41 @@ mod tests {
         let faery = find("t,x@320,y@240,on\n5,1,2,1\n", None).unwrap();
         assert_eq!((faery.columns, faery.geometry), ([0, 1, 2, 3], Geometry::new(320, 240)));
         assert_eq!(columns("t_s x y p\n0.5 1 2 1\n"), ([0, 1, 2, 3], TimeUnit::Seconds));
-        // An index without a name, and names without rows.
-        assert_eq!(columns(",t_us,x,y,p\n0,5,1,2,1\n"), ([1, 2, 3, 4], TimeUnit::Microseconds));
-        assert!(find("t,x,y,p\n", None).is_ok());
+    }
+
+    #[test]
+    fn a_column_without_a_name_keeps_its_place() {
+        let us = TimeUnit::Microseconds;
+        assert_eq!(columns(",t,x,y,p\n0,5,1,2,1\n"), ([1, 2, 3, 4], us));
+        assert_eq!(columns("\"\",t,x,y,p,\n0,5,1,2,1,\n"), ([1, 2, 3, 4], us));
+        assert_eq!(columns("\tt\tx\ty\tp\n0\t5\t1\t2\t1\n"), ([1, 2, 3, 4], us));
+        assert_eq!(columns("t;;x;y;p\n5;0;1;2;1\n"), ([0, 2, 3, 4], us));
+        // Without fields either.
+        assert_eq!(columns(",t,x,y,p\n,5,1,2,1\n"), ([0, 1, 2, 3], us));
+        assert_eq!(columns("t,\tx,\ty,\tp\n5,\t1,\t2,\t1\n"), ([0, 1, 2, 3], us));
+    }
+
+    #[test]
+    fn columns_without_a_row_are_a_recording_without_events() {
+        let none = find("t,x,y,p\n", None).unwrap();
+        assert_eq!((none.skip_lines, none.geometry, none.assumed.len()), (1, None, 0));
+        let named = find("x@320,y@240,t_ms,on", None).unwrap();
+        assert_eq!((named.columns, named.geometry), ([2, 0, 1, 3], Geometry::new(320, 240)));
+        assert_eq!((named.unit, named.assumed.len()), (TimeUnit::Milliseconds, 1));
+        let vendor = find("%geometry:640,480\n", None).unwrap();
+        assert_eq!((vendor.columns, vendor.geometry), ([3, 0, 1, 2], Geometry::new(640, 480)));
+    }
+
+    #[test]
+    fn the_line_shown_is_the_line_told() {
+        for (head, told) in [
+            ("# notes\n\n1 2\n", "line 1 is \"# notes\""),
+            ("\u{feff}1\n2\n", "line 1 is \"1\""),
+            ("t,x,y,p\nDear reader\n", "line 2 is \"Dear reader\""),
+        ] {
+            let error = find(head, None).unwrap_err().to_string();
+            assert!(error.contains(told), "{error}");
+        }
     }
 
     #[test]

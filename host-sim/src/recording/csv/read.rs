@@ -74,8 +74,8 @@ impl Source for Text {
             let line = &bytes[start..end];
             start = end + 1;
             self.line += 1;
-            let line =
-                line.strip_prefix(&BYTE_ORDER_MARK).filter(|_| self.line == 1).unwrap_or(line);
+            // Also in the midst, where another text was put behind the one before.
+            let line = line.strip_prefix(&BYTE_ORDER_MARK).unwrap_or(line);
             if self.line <= self.layout.skip_lines {
                 continue;
             }
@@ -216,8 +216,33 @@ fn microseconds(field: &[u8], exponent: i32) -> Option<u64> {
 }
 
 #[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test")]
 mod tests {
     use super::*;
+
+    /// The times of all events in a text.
+    fn times(text: &'static str) -> Vec<u64> {
+        let mut source = open(Input::new(Box::new(text.as_bytes())), None).unwrap().source;
+        let mut events = Vec::new();
+        while source.read(&mut events, &mut Side::default()).unwrap() {}
+        events.iter().map(|event| event.t_us).collect()
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_no_part_of_a_line() {
+        assert_eq!(times("\u{feff}0,1,2,1\n7,1,2,0\n"), [0, 7]);
+        assert_eq!(times("\u{feff}t,x,y,p\n0,1,2,1\n\u{feff}t,x,y,p\n7,1,2,0\n"), [0, 7]);
+    }
+
+    #[test]
+    fn a_column_without_a_name_means_nothing() {
+        assert_eq!(times(",t,x,y,p\n0,500,1,2,1\n1,700,1,2,0\n"), [500, 700]);
+    }
+
+    #[test]
+    fn columns_without_a_row_are_no_events() {
+        assert!(times("t,x,y,p\n").is_empty());
+    }
 
     #[test]
     fn seconds_become_microseconds_exactly() {

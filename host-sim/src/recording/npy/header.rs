@@ -1,5 +1,7 @@
 //! The header of an array: which number lies where.
 
+use std::fmt;
+
 use super::MAGIC;
 use super::literal::Value;
 use crate::recording::error::{Place, RecordingError};
@@ -37,6 +39,16 @@ impl Number {
             Self::Unsigned(value) => value as f64,
             Self::Signed(value) => value as f64,
             Self::Float(value) => value,
+        }
+    }
+}
+
+impl fmt::Display for Number {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unsigned(value) => write!(f, "{value}"),
+            Self::Signed(value) => write!(f, "{value}"),
+            Self::Float(value) => write!(f, "{value}"),
         }
     }
 }

@@ -161,8 +161,7 @@ impl Arrays {
         };
         let t = number(0);
         Ok(Event {
-            t_us: microseconds(t, self.unit)
-                .ok_or_else(|| format!("the time is {}", t.as_f64()))?,
+            t_us: microseconds(t, self.unit).ok_or_else(|| format!("the time is {t}"))?,
             x: pixel(number(1)),
             y: pixel(number(2)),
             polarity: if number(3).as_f64() > 0.0 { Polarity::On } else { Polarity::Off },
@@ -223,5 +222,39 @@ impl Source for Arrays {
         self.left -= count as u64;
         self.record += count as u64;
         Ok(self.left > 0)
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test")]
+mod tests {
+    use super::*;
+    use crate::recording::npy::MAGIC;
+
+    /// An array file with one event at (1, 2).
+    fn file(time_kind: &str, time: [u8; 8]) -> Vec<u8> {
+        let header = format!(
+            "{{'descr': [('t', '{time_kind}'), ('x', '<u2'), ('y', '<u2'), ('p', '?')], 'fortran_order': False, 'shape': (1,)}}"
+        );
+        let length = (header.len() as u16).to_le_bytes();
+        [MAGIC, &[1, 0], &length, header.as_bytes(), &time, &[1, 0, 2, 0, 1]].concat()
+    }
+
+    fn event(time_kind: &str, time: [u8; 8]) -> Result<Event, RecordingError> {
+        let bytes = std::io::Cursor::new(file(time_kind, time));
+        let mut source = open(Input::new(Box::new(bytes)), None)?.source;
+        let mut events = Vec::new();
+        source.read(&mut events, &mut Side::default())?;
+        Ok(events[0])
+    }
+
+    #[test]
+    fn a_time_that_is_none_is_told_as_a_number() {
+        let told = |kind, time| event(kind, time).unwrap_err().to_string();
+        let negative = told("<i8", (-500_i64).to_le_bytes());
+        assert!(negative.starts_with("NPY, record 0: the time is -500\n"), "{negative}");
+        let fraction = told("<f8", (-0.25_f64).to_le_bytes());
+        assert!(fraction.starts_with("NPY, record 0: the time is -0.25\n"), "{fraction}");
+        assert_eq!(event("<i8", 500_i64.to_le_bytes()).unwrap().t_us, 500);
     }
 }
