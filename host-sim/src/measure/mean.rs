@@ -146,12 +146,19 @@ pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) 
     let gaps = gaps(&tiles, span_us);
     let open_s: f64 = gaps.iter().map(|gap| seconds(gap.start, gap.end)).sum();
     let weight: f64 = tiles.iter().map(|tile| tile.weight()).sum();
+    let reach_s = match (tiles.first(), tiles.last()) {
+        (Some(first), Some(last)) => seconds(first.window_us.start, last.window_us.end),
+        _ => 0.0,
+    };
     for open_us in gaps {
         let middle_us = open_us.start.midpoint(open_us.end);
         if let Some(near) = pieces.iter().min_by_key(|p| p.middle_us().abs_diff(middle_us)) {
             let length_s = seconds(open_us.start, open_us.end);
             let away_s = seconds(near.middle_us(), middle_us);
-            let moved = line.slope_rad_s2.map_or(0.0, |_| away_s * away_s * line.slope_variance);
+            // Farther away than the windows reach, an acceleration may long have ended.
+            let ended_rad_s = slope_rad_s2 * (away_s.abs() - reach_s).max(0.0);
+            let moved = line.slope_rad_s2.map_or(0.0, |_| away_s * away_s * line.slope_variance)
+                + ended_rad_s * ended_rad_s;
             // How much of what the next reading is off by the line is the speed's, and not its own error.
             let own = scatter / (scatter + near.variance()).max(f64::from(f32::MIN_POSITIVE));
             // What lasts for longer than a window averages out.
@@ -357,6 +364,26 @@ mod tests {
         turning.speed.alpha_rad_s2 = Some(1.0);
         let mean = mean_speed(&[turning], &(0..1_000_000_000), 0.0).expect("a reading");
         assert!(mean.omega_sigma_rad_s > 100.0, "{mean:?}");
+    }
+
+    #[test]
+    fn an_acceleration_that_may_have_ended_is_in_the_error() {
+        // Sped up for 0.6 s and seen no more; what came after may be as it was at the end.
+        let pieces: Vec<Piece> = (0..4)
+            .map(|i| {
+                let speed = Speed {
+                    omega_rad_s: 100.0 + 4.5 * i as f32,
+                    omega_sigma_rad_s: 0.002,
+                    alpha_rad_s2: Some(30.0),
+                    frame: Frame::Camera,
+                };
+                Piece { window_us: i * 150_000..(i + 1) * 150_000, speed, swing_rad_s: 0.0 }
+            })
+            .collect();
+        let mean = |until_us| mean_speed(&pieces, &(0..until_us), 0.0).expect("readings");
+        assert!(mean(650_000).omega_sigma_rad_s < 0.01, "{:?}", mean(650_000));
+        let late = mean(20_000_000);
+        assert!(late.omega_rad_s - 115.75 < 2.0 * late.omega_sigma_rad_s, "{late:?}");
     }
 
     #[test]
