@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, bail};
 use evtach_core::{Event, Roi};
+use evtach_host::measure::LONGEST_WAIT_US;
 use evtach_host::recording::write::{self, WriteFormat};
 use evtach_host::recording::{self, ImuSample};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -14,7 +15,6 @@ use super::how::parse_roi;
 use super::keep_apart;
 use super::span::Span;
 use super::stated::Stated;
-use super::wait::LONGEST_US;
 
 /// Arguments of `evtach convert`.
 #[derive(clap::Args)]
@@ -168,7 +168,7 @@ impl Picker {
             let (first_us, shift_us) = self.origin(event.t_us);
             let since_us = event.t_us.saturating_sub(first_us);
             // Recorders write inertial samples behind the events of their time.
-            let is_beyond = since_us.saturating_sub(self.end_us) > LONGEST_US;
+            let is_beyond = since_us.saturating_sub(self.end_us) > LONGEST_WAIT_US;
             self.beyond = if is_beyond { self.beyond + 1 } else { 0 };
             self.is_past_end = since_us >= self.end_us;
             if self.is_past_end {

@@ -2,12 +2,15 @@
 
 use std::path::Path;
 
-use anyhow::Context;
-use evtach_core::{Geometry, GyroSample, Roi, Settings};
-use evtach_host::measure::Capacity;
-use evtach_host::recording::{self, ImuSample, Recording};
+use anyhow::{Context, bail};
+use evtach_core::{Event, Geometry, Reading, Roi, Settings};
+use evtach_host::measure::{Capacity, FileFacts, Plan, Run, Summary, Timeline, summarise};
+use evtach_host::recording;
+use indicatif::{ProgressBar, ProgressStyle};
 
+use super::span::Span;
 use super::stated::Stated;
+use super::{in_order, note};
 
 /// What is known better than the tachometer finds it, and the memory it is given.
 #[derive(clap::Args)]
@@ -17,44 +20,98 @@ pub struct How {
     blades: Option<u8>,
     /// Look at this part of the sensor only, in pixels.
     #[arg(long, value_name = "X,Y,W,H", value_parser = parse_roi)]
-    pub roi: Option<Roi>,
+    roi: Option<Roi>,
     /// Fixed window instead of one that adapts to the rotor.
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u32).range(5..=2000))]
     window_ms: Option<u32>,
     #[command(flatten)]
+    span: Span,
+    #[command(flatten)]
     stated: Stated,
     /// Memory of the tachometer: "device" gives what the device shows, to the bit.
     #[arg(long, value_enum, default_value = "full")]
-    pub capacity: Capacity,
+    capacity: Capacity,
     /// One standard deviation of the camera clock's error.
     #[arg(long, value_name = "PPM", default_value_t = 15.0, value_parser = parse_clock_ppm)]
-    pub clock_ppm: f32,
+    clock_ppm: f32,
     /// Take the camera's own roll out of the speed by the recording's gyro, where it has one.
     ///
     /// The gyro's offset is found while measuring, in some seconds from the hand; --gyro-sigma tells how well it is known before. Its
     /// axes are those of the cameras' documentation, not yet checked against a recording of a rolling camera.
     #[arg(long)]
-    pub gyro: bool,
+    gyro: bool,
     /// One standard deviation of the gyro's zero-rate offset; 0.003 where it was calibrated on a still camera. Unless stated, that of
     /// data sheets.
     #[arg(long, value_name = "RAD/S", value_parser = parse_gyro_sigma)]
     gyro_sigma: Option<f32>,
 }
 
+/// What was measured of a recording.
+pub struct Measured {
+    pub facts: FileFacts,
+    pub geometry: Geometry,
+    /// What was assumed about the file, one sentence each.
+    pub assumed: Vec<String>,
+    pub readings: Vec<Reading>,
+    pub summary: Summary,
+}
+
 impl How {
-    /// Opens a recording and says on stderr what was assumed about it.
-    pub fn open(&self, file: &Path) -> anyhow::Result<Recording> {
+    /// Measures a recording, and says on stderr what is to be known of it. `seen` is handed the events that are measured.
+    pub fn measure(
+        &self,
+        file: &Path,
+        mut seen: impl FnMut(&[Event], &Timeline),
+    ) -> anyhow::Result<Measured> {
         let name = file.display().to_string();
         let options = self.stated.into();
-        let recording = recording::open(file, &options).with_context(|| name.clone())?;
+        let mut recording = recording::open(file, &options).with_context(|| name.clone())?;
         for assumed in &recording.assumed {
             eprintln!("{name}: {assumed}");
         }
-        Ok(recording)
+        let plan = Plan {
+            settings: self.settings(recording.geometry),
+            capacity: self.capacity,
+            takes_gyro: self.gyro,
+            since_us: self.span.since_us(),
+        };
+        let bar = spinner(&name);
+        let run = Run::over(name.clone(), &mut recording, &plan, |events, timeline| {
+            bar.inc(events.len() as u64);
+            seen(events, timeline);
+        });
+        bar.finish_and_clear();
+        if self.gyro && !run.has_gyro {
+            eprintln!("{name}: no gyro samples; speeds are relative to the camera");
+        }
+        match run.damage {
+            Some(damage) if run.events_read == 0 => return Err(damage).context(name),
+            Some(damage) => eprintln!("{name}: {damage}; measured what came before"),
+            None if run.events_read == 0 => bail!(
+                "{name}: the recording holds no events; record again, or check the format with `evtach info`"
+            ),
+            None => {}
+        }
+        if run.readings.is_empty() && (!self.span.is_all() || self.roi.is_some()) {
+            bail!("{name}: no events between --start and --end inside --roi; widen them");
+        }
+        note(&recording, &name);
+        if run.out_of_order > 0 {
+            eprintln!("{name}: {} events stepped back in time and were left out", run.out_of_order);
+        }
+        if run.timeline.is_set_back() {
+            let set_back = run.timeline.note();
+            eprintln!("{name}: {set_back}; what follows is measured as if it came then");
+        }
+        in_order(&recording, &name)?;
+        let Run { facts, readings, .. } = run;
+        let summary = summarise(&readings, &(facts.first_us..facts.last_us), self.clock_ppm);
+        let (geometry, assumed) = (recording.geometry, recording.assumed);
+        Ok(Measured { facts, geometry, assumed, readings, summary })
     }
 
     /// The tachometer's settings for a sensor of this size.
-    pub fn settings(&self, geometry: Geometry) -> Settings {
+    fn settings(&self, geometry: Geometry) -> Settings {
         let mut settings = Settings::new(geometry);
         settings.roi = self.roi;
         settings.blades = self.blades;
@@ -65,18 +122,14 @@ impl How {
         }
         settings
     }
+}
 
-    /// What the gyro told of the camera's roll since the last call; nothing where it is not asked for.
-    pub fn rolls(&self, recording: &mut Recording) -> Vec<GyroSample> {
-        let samples = recording.take_imu();
-        if self.gyro { samples.iter().map(ImuSample::roll).collect() } else { Vec::new() }
-    }
-
-    /// Says on stderr that the gyro was asked for and is not in the recording.
-    pub fn note_gyro(&self, name: &str, found: bool) {
-        if self.gyro && !found {
-            eprintln!("{name}: no gyro samples; speeds are relative to the camera");
-        }
+/// Shows how many events were measured so far.
+fn spinner(name: &str) -> ProgressBar {
+    let bar = ProgressBar::new_spinner().with_message(name.to_owned());
+    match ProgressStyle::with_template("{spinner} {msg} {human_pos} events, {per_sec}") {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
     }
 }
 

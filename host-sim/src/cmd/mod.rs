@@ -16,7 +16,6 @@ pub mod screen;
 mod span;
 mod stated;
 pub mod synth;
-mod wait;
 pub mod watch;
 
 /// Refuses to write over what is read, by whatever name.

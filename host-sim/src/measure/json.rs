@@ -20,7 +20,7 @@ pub struct Document {
     pub width_px: u16,
     /// Rows of the sensor.
     pub height_px: u16,
-    /// From the first to the last event.
+    /// From the first to the last event that was measured.
     pub duration_s: f64,
     /// Events in the part of the file that was measured.
     pub events: u64,
@@ -70,7 +70,7 @@ pub struct RotorRow {
 /// One reading of the series.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ReadingRow {
-    /// Middle of the window from the first event.
+    /// Middle of the window, from the file's first event.
     pub t_s: f64,
     /// Length of the window.
     pub window_s: f64,
@@ -91,11 +91,13 @@ pub struct FileFacts {
     pub format: String,
     /// Columns and rows of the sensor.
     pub size_px: (u16, u16),
-    /// First event in sensor time.
+    /// First event of the file in sensor time.
+    pub origin_us: u64,
+    /// First event that was measured in sensor time.
     pub first_us: u64,
-    /// Last event in sensor time.
+    /// Last event that was measured in sensor time.
     pub last_us: u64,
-    /// Events in the file.
+    /// Events that were measured.
     pub events: u64,
     /// Events left out on purpose.
     pub thinned: u64,
@@ -111,6 +113,20 @@ fn reason(status: Status) -> Option<&'static str> {
 /// settles a tie of the last digit.
 fn widen(value: f32) -> f64 {
     ryu::Buffer::new().format(value).parse().unwrap_or(f64::from(value))
+}
+
+impl FileFacts {
+    /// Seconds from the file's first event to a moment of sensor time.
+    #[must_use]
+    pub fn t_s(&self, t_us: u64) -> f64 {
+        t_us.saturating_sub(self.origin_us) as f64 / 1e6
+    }
+
+    /// How much of the file was measured, in seconds.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        self.last_us.saturating_sub(self.first_us) as f64 / 1e6
+    }
 }
 
 impl RotorRow {
@@ -136,11 +152,11 @@ impl RotorRow {
 }
 
 impl ReadingRow {
-    /// The row of a reading; `first_us` is the first event in sensor time.
+    /// The row of a reading; `origin_us` is the file's first event in sensor time.
     #[must_use]
-    pub fn new(reading: &Reading, first_us: u64) -> Self {
+    pub fn new(reading: &Reading, origin_us: u64) -> Self {
         Self {
-            t_s: reading.t_us.saturating_sub(first_us) as f64 / 1e6,
+            t_s: reading.t_us.saturating_sub(origin_us) as f64 / 1e6,
             window_s: f64::from(reading.window_us) / 1e6,
             status: reading.status.as_str().into(),
             reason: reason(reading.status).map(Cow::from),
@@ -159,14 +175,14 @@ impl Document {
             format: facts.format.clone(),
             width_px: facts.size_px.0,
             height_px: facts.size_px.1,
-            duration_s: facts.last_us.saturating_sub(facts.first_us) as f64 / 1e6,
+            duration_s: facts.duration_s(),
             events: facts.events,
             thinned: facts.thinned,
             lost: facts.lost,
             status: summary.status.as_str(),
             reason: reason(summary.status),
             rotors: summary.rotors.iter().map(RotorRow::new).collect(),
-            readings: readings.iter().map(|r| ReadingRow::new(r, facts.first_us)).collect(),
+            readings: readings.iter().map(|r| ReadingRow::new(r, facts.origin_us)).collect(),
         }
     }
 }

@@ -2,10 +2,12 @@
 
 mod json;
 mod mean;
+mod run;
 mod summary;
 mod table;
 mod ties;
 mod timeline;
+mod wait;
 
 use std::borrow::Cow;
 
@@ -15,11 +17,14 @@ use evtach_core::{
     Event, GyroSample, Memory, More, Poll, Reading, Settings, StoredEvent, Tachometer, Work,
 };
 
+use ties::Ties;
+
 pub use json::{Document, FileFacts, ReadingRow, RotorRow, letter};
+pub use run::{Plan, Run};
 pub use summary::{Summary, summarise};
 pub use table::{evidence, table};
-pub use ties::Ties;
 pub use timeline::Timeline;
+pub use wait::LONGEST_US as LONGEST_WAIT_US;
 
 /// A PC searches among so many times as many events as the device.
 const MORE: usize = 8;

@@ -21,6 +21,14 @@ pub struct Summary {
     pub rotors: Vec<RotorReading>,
 }
 
+impl Summary {
+    /// Whether any rotor has a speed.
+    #[must_use]
+    pub fn has_speed(&self) -> bool {
+        self.rotors.iter().any(|rotor| rotor.speed.is_some())
+    }
+}
+
 /// Sums up a series; `span_us` is from the first event of the recording to the last, in sensor time.
 #[must_use]
 pub fn summarise(readings: &[Reading], span_us: &Range<u64>, clock_sigma_ppm: f32) -> Summary {

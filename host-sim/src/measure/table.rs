@@ -11,17 +11,18 @@ use super::summary::Summary;
 #[must_use]
 pub fn table(facts: &FileFacts, summary: &Summary, readings: &[Reading]) -> String {
     let mut text = String::new();
-    let seconds = facts.last_us.saturating_sub(facts.first_us) as f64 * 1e-6;
     let (width, height) = facts.size_px;
     let _ = writeln!(
         text,
-        "{}: {} {width}x{height}, {seconds:.3} s, {} events ({} thinned, {} lost), {} readings",
+        "{}: {} {width}x{height}, {:.3} s, {} events ({} thinned, {} lost), {} reading{}",
         facts.file,
         facts.format,
+        facts.duration_s(),
         facts.events,
         facts.thinned,
         facts.lost,
-        readings.len()
+        readings.len(),
+        if readings.len() == 1 { "" } else { "s" }
     );
     for rotor in &summary.rotors {
         let _ = writeln!(text, "  {}", row(rotor));
@@ -70,7 +71,7 @@ fn with_error(speed: &Speed) -> String {
 
 /// What each stage found, for `-v`.
 #[must_use]
-pub fn evidence(readings: &[Reading], first_us: u64) -> String {
+pub fn evidence(facts: &FileFacts, readings: &[Reading]) -> String {
     let mut text = String::new();
     let rpm = |value: Option<f32>| {
         value.map_or_else(|| "-".to_owned(), |v| format!("{:.2}", v * Speed::RPM_PER_RAD_S))
@@ -80,7 +81,7 @@ pub fn evidence(readings: &[Reading], first_us: u64) -> String {
         let _ = writeln!(
             text,
             "  t {:.3} s, window {:.0} ms, {} events: {}{}",
-            reading.t_us.saturating_sub(first_us) as f64 * 1e-6,
+            facts.t_s(reading.t_us),
             f64::from(reading.window_us) * 1e-3,
             reading.events,
             reading.status.as_str(),

@@ -96,7 +96,7 @@ pub fn html(subject: &Subject<'_>) -> Result<String, ReportError> {
         ),
         None => "<p>No reading has a speed.</p>\n".to_owned(),
     };
-    let stages = evidence(subject.readings, subject.facts.first_us);
+    let stages = evidence(subject.facts, subject.readings);
     body += &format!("<h2>What each stage found</h2>\n<pre>{}</pre>\n", escaped(&stages));
     Ok(format!(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title>\n<style>{STYLE}</style>\

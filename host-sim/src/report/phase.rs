@@ -38,7 +38,7 @@ pub fn draw(subject: &Subject<'_>, id: u8) -> Result<Option<String>, ReportError
     let Some(folded) = fold(subject, reading, rotor) else { return Ok(None) };
     let mut svg = String::new();
     paint(&folded, id, &mut svg).map_err(ReportError::of("phase"))?;
-    let middle_s = (reading.t_us - subject.facts.first_us.min(reading.t_us)) as f64 * 1e-6;
+    let middle_s = subject.facts.t_s(reading.t_us);
     let text = format!(
         "<p>The window of {:.0} ms around {middle_s:.3} s, events turned back by the measured speed and folded by {} \
          (light: ON, dark: OFF). Below: what is left of the phase over whole symmetry periods, in degrees of the rotor.</p>\n",

@@ -37,7 +37,7 @@ fn marks(subject: &Subject<'_>, id: u8) -> Vec<Mark> {
     rows.filter_map(|(t_us, rotor)| {
         let speed = rotor.speed?;
         Some(Mark {
-            t_s: (t_us as f64 - subject.facts.first_us as f64) * 1e-6,
+            t_s: subject.facts.t_s(t_us),
             rpm: f64::from(speed.rpm()),
             bar: 1.96 * f64::from(speed.rpm_sigma()),
             locked: rotor.status == Status::Locked,
@@ -54,8 +54,8 @@ fn paint(
     let size = (SIZE.0, SIZE.1 * all.len() as u32);
     let area = SVGBackend::with_string(svg, size).into_drawing_area();
     area.fill(&WHITE)?;
-    let end_s =
-        (subject.facts.last_us - subject.facts.first_us.min(subject.facts.last_us)) as f64 * 1e-6;
+    let facts = subject.facts;
+    let (start_s, end_s) = (facts.t_s(facts.first_us), facts.t_s(facts.last_us));
     let end_s = all.iter().flat_map(|(_, marks)| marks).fold(end_s, |end, mark| end.max(mark.t_s));
     for ((id, marks), panel) in all.iter().zip(area.split_evenly((all.len(), 1))) {
         // The scale follows the locked readings; a coarse one may run off it.
@@ -68,7 +68,7 @@ fn paint(
             .margin(10)
             .x_label_area_size(35)
             .y_label_area_size(80)
-            .build_cartesian_2d(0.0..end_s.max(1e-3), low - margin..high + margin)?;
+            .build_cartesian_2d(start_s..end_s.max(start_s + 1e-3), low - margin..high + margin)?;
         chart
             .configure_mesh()
             .x_desc("time from the first event (s)")

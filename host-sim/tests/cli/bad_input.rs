@@ -224,9 +224,10 @@ fn clock_that_starts_again() {
     // The parts lie end to end.
     let both = format!(" {:.3} s, {} events", 2e-6 * lasts_us as f64, events.len());
     assert!(run.stdout.contains(&both), "{both}: {}", run.stdout);
-    let run = evtach(&["plot", &path.display().to_string()], b"");
+    let run = evtach(&["plot", &path.display().to_string(), "--out", "-"], b"");
     assert_eq!(run.code, Some(0), "{}", run.stderr);
     assert!(run.stderr.contains(&told), "{told}: {}", run.stderr);
+    assert!(run.stdout.contains(&both), "{both} is not in the report");
 }
 
 #[test]

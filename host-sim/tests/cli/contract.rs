@@ -1,5 +1,5 @@
 //! `evtach measure --json`: the names and types that other programs rely on. `"schema"` counts their versions: when
-//! a test here has to change, so has that number.
+//! a test here has to change, so has that number. `host-sim/JSON.md` tells people what they mean.
 
 use evtach_core::Reason;
 use serde_json::{Map, Value};
@@ -164,6 +164,40 @@ fn one_document_a_file_with_exactly_these_fields() {
     let second = check_document(second);
     assert_eq!(second["status"], "refused");
     assert_eq!(second["file"], without.as_str());
+}
+
+#[test]
+fn every_field_is_explained() {
+    let manual = include_str!("../../JSON.md");
+    for (part, fields) in
+        [("# The file", &DOCUMENT[..]), ("# A reading", &READING), ("# A rotor", &ROTOR)]
+    {
+        let rest = manual.split_once(part).map(|(_, rest)| rest).expect("a part for each object");
+        let part = rest.split_once("\n## ").map_or(rest, |(part, _)| part);
+        let names: Vec<&str> = part
+            .lines()
+            .filter(|line| line.starts_with("| `"))
+            .flat_map(|line| line.split('|').nth(1).unwrap_or("").split('`').skip(1).step_by(2))
+            .collect();
+        let mut expected: Vec<&str> = fields.iter().map(|field| field.0).collect();
+        expected.sort_unstable();
+        let mut told = names.clone();
+        told.sort_unstable();
+        assert_eq!(told, expected);
+    }
+}
+
+/// Where a part is measured, its readings lie where they lie in the whole.
+#[test]
+fn times_count_from_the_first_event_of_the_file() {
+    let folder = folder();
+    let file = write(&folder, "rotor.raw", &rotor()).display().to_string();
+    let run = evtach(&["measure", "--json", "--start", "0.05", &file], b"");
+    let document = check_document(run.stdout.trim_end());
+    let half_s = document["duration_s"].as_f64().expect("a number") / 2.0;
+    let last = document["readings"].as_array().and_then(|readings| readings.last());
+    let t_s = last.and_then(|reading| reading["t_s"].as_f64()).expect("a reading");
+    assert!((t_s - 0.05 - half_s).abs() < 5e-3, "{t_s} s, half of it {half_s} s");
 }
 
 #[test]

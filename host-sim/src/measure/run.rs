@@ -1,0 +1,187 @@
+//! One recording, read and measured from its first event to its last.
+
+use std::ops::Range;
+
+use evtach_core::{Event, GyroSample, Reading, Settings};
+
+use super::wait::Wait;
+use super::{Capacity, FileFacts, Ties, Timeline, drain, feed, with_tachometer};
+use crate::recording::{ImuSample, Recording, RecordingError};
+
+/// How a recording is to be measured.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// What is known better than the tachometer finds it.
+    pub settings: Settings,
+    /// The memory it is lent.
+    pub capacity: Capacity,
+    /// Whether the recording's gyro is to be taken.
+    pub takes_gyro: bool,
+    /// The part that is measured, in microseconds from the first event.
+    pub since_us: Range<u64>,
+}
+
+/// What came of it.
+#[derive(Debug)]
+pub struct Run {
+    /// The file, and the part of it that was measured.
+    pub facts: FileFacts,
+    /// The series of readings, parts of a clock that is set back laid end to end.
+    pub readings: Vec<Reading>,
+    /// Events of the whole file.
+    pub events_read: u64,
+    /// Events that stepped back in time and were left out; `facts.lost` counts them, too.
+    pub out_of_order: u64,
+    /// Whether there were gyro samples that were to be taken.
+    pub has_gyro: bool,
+    /// Where the clock was set back.
+    pub timeline: Timeline,
+    /// The damage that the file ends with; what came before it is measured.
+    pub damage: Option<RecordingError>,
+}
+
+impl Run {
+    /// Measures a recording, named `file`. `seen` is handed the events of the part that is measured as they are read, by the camera's
+    /// clock, which the timeline lays end to end.
+    pub fn over(
+        file: String,
+        recording: &mut Recording,
+        plan: &Plan,
+        seen: impl FnMut(&[Event], &Timeline),
+    ) -> Self {
+        let mut facts = FileFacts {
+            file,
+            format: recording.format.to_owned(),
+            size_px: (recording.geometry.width_px, recording.geometry.height_px),
+            ..FileFacts::default()
+        };
+        let mut readings = Vec::new();
+        let mut has_gyro = false;
+        let mut parts = Parts::of(recording, plan.capacity);
+        let out_of_order = with_tachometer(plan.settings, plan.capacity, |tachometer| {
+            let since_us = plan.since_us.clone();
+            let mut chosen = Chosen { since_us, origin_us: None, facts: &mut facts, seen };
+            let (mut part, mut known_lost) = (Vec::new(), 0);
+            let (mut rolls, mut wait) = (Vec::<GyroSample>::new(), Wait::default());
+            while !parts.is_done() {
+                let set_back_us = parts.next(&mut part);
+                chosen.leave(&mut part, &parts.timeline);
+                let lost = parts.recording.lost();
+                tachometer.lost(lost - known_lost);
+                known_lost = lost;
+                let samples = parts.recording.take_imu();
+                if plan.takes_gyro {
+                    has_gyro |= !samples.is_empty();
+                    rolls.extend(samples.iter().map(ImuSample::roll));
+                    wait.hold(&mut part, &rolls, parts.more && set_back_us.is_none());
+                }
+                let mut ahead = &rolls[..];
+                let mut keep = |reading| readings.push(parts.timeline.laid(reading));
+                feed(tachometer, &part, &mut ahead, &mut keep);
+                let used = rolls.len() - ahead.len();
+                rolls.drain(..used);
+                // The device forgets a window that its clock leaves behind. What is out of order throughout will be refused.
+                let ends = set_back_us.is_some()
+                    && plan.capacity == Capacity::Full
+                    && !parts.recording.is_shuffled();
+                if ends || parts.is_done() {
+                    tachometer.finish();
+                    drain(tachometer, &mut keep);
+                }
+                if let Some(t_us) = set_back_us {
+                    parts.timeline.set_back_to(t_us);
+                }
+            }
+            chosen.facts.thinned = tachometer.thinned();
+            tachometer.ignored().out_of_order
+        });
+        let Parts { timeline, events_read, damage, .. } = parts;
+        facts.lost = recording.lost() + out_of_order;
+        Self { facts, readings, events_read, out_of_order, has_gyro, timeline, damage }
+    }
+}
+
+/// The part of a recording that is to be measured.
+struct Chosen<'a, S> {
+    since_us: Range<u64>,
+    /// The first event of all.
+    origin_us: Option<u64>,
+    facts: &'a mut FileFacts,
+    seen: S,
+}
+
+impl<S: FnMut(&[Event], &Timeline)> Chosen<'_, S> {
+    /// Leaves of the next events those of the part, and counts them.
+    fn leave(&mut self, events: &mut Vec<Event>, timeline: &Timeline) {
+        let Some(first) = events.first() else { return };
+        let origin_us = *self.origin_us.get_or_insert(first.t_us);
+        self.facts.origin_us = origin_us;
+        let since_us = |event: &Event| timeline.at(event.t_us).saturating_sub(origin_us);
+        events.retain(|event| self.since_us.contains(&since_us(event)));
+        let (Some(first), Some(last)) = (events.first(), events.last()) else { return };
+        if self.facts.events == 0 {
+            self.facts.first_us = timeline.at(first.t_us);
+        }
+        self.facts.last_us = timeline.at(last.t_us);
+        self.facts.events += events.len() as u64;
+        (self.seen)(events, timeline);
+    }
+}
+
+/// The events of a recording in parts, across none of which its clock is set back.
+struct Parts<'a> {
+    recording: &'a mut Recording,
+    ties: Option<Ties>,
+    timeline: Timeline,
+    /// What was read, and how much of it was handed out.
+    events: Vec<Event>,
+    taken: usize,
+    more: bool,
+    events_read: u64,
+    damage: Option<RecordingError>,
+}
+
+impl<'a> Parts<'a> {
+    fn of(recording: &'a mut Recording, capacity: Capacity) -> Self {
+        Self {
+            recording,
+            ties: (capacity == Capacity::Full).then(Ties::default),
+            timeline: Timeline::default(),
+            events: Vec::new(),
+            taken: 0,
+            more: true,
+            events_read: 0,
+            damage: None,
+        }
+    }
+
+    const fn is_done(&self) -> bool {
+        !self.more && self.taken == self.events.len()
+    }
+
+    /// Puts the next events in place of `part`. Where the clock is set back, there are none, and the time that it is set to is told.
+    fn next(&mut self, part: &mut Vec<Event>) -> Option<u64> {
+        if self.taken == self.events.len() {
+            self.read();
+        }
+        let rest = &self.events[self.taken..];
+        let length = self.timeline.part(rest);
+        part.clear();
+        part.extend_from_slice(&rest[..length]);
+        self.taken += length;
+        rest.first().filter(|_| length == 0).map(|event| event.t_us)
+    }
+
+    fn read(&mut self) {
+        self.events.clear();
+        self.taken = 0;
+        self.more = self.recording.read_chunk(&mut self.events).unwrap_or_else(|damage| {
+            self.damage = Some(damage);
+            false
+        });
+        self.events_read += self.events.len() as u64;
+        if let Some(ties) = &mut self.ties {
+            ties.order(&mut self.events, self.more);
+        }
+    }
+}
