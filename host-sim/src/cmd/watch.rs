@@ -54,10 +54,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         let options = args.stated.into();
         file(recording::open(&args.from, &options).with_context(|| name.clone())?, args.speed)
     };
-    let mut monitor = Monitor::new(name);
+    let mut monitor = Monitor::new(name.clone());
     let shown = show(ratatui::init(), &source, &mut monitor);
     ratatui::restore();
     shown.context("the terminal failed")?;
+    // The view had room for its first words.
+    if let Some(failure) = monitor.failure() {
+        eprintln!("{name}: {failure}");
+    }
     Ok(ExitCode::from(u8::from(!monitor.seen_speed())))
 }
 

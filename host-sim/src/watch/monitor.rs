@@ -17,8 +17,10 @@ pub enum Told {
     Reading(ReadingRow),
     /// Something about the source, for the person.
     Note(String),
-    /// There is nothing more to come, and why.
-    End(String),
+    /// There is nothing more to come.
+    End,
+    /// There is nothing more to come, and why: something failed.
+    Failure(String),
 }
 
 /// What is shown.
@@ -29,6 +31,7 @@ pub struct Monitor {
     last: Duration,
     note: String,
     ended: bool,
+    failure: Option<String>,
     chosen: usize,
     seen_speed: bool,
 }
@@ -43,6 +46,7 @@ impl Monitor {
             last: Duration::ZERO,
             note: "waiting for the first reading".to_owned(),
             ended: false,
+            failure: None,
             chosen: 0,
             seen_speed: false,
         }
@@ -65,8 +69,13 @@ impl Monitor {
                 self.note.clear();
             }
             Told::Note(note) => self.note = note,
-            Told::End(note) => {
-                self.note = note;
+            Told::End => {
+                "the recording has ended".clone_into(&mut self.note);
+                self.ended = true;
+            }
+            Told::Failure(failure) => {
+                self.note.clone_from(&failure);
+                self.failure = Some(failure);
                 self.ended = true;
             }
         }
@@ -88,6 +97,12 @@ impl Monitor {
     #[must_use]
     pub fn note(&self) -> &str {
         &self.note
+    }
+
+    /// What failed, in full.
+    #[must_use]
+    pub fn failure(&self) -> Option<&str> {
+        self.failure.as_deref()
     }
 
     /// Whether any reading had a speed.

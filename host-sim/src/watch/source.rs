@@ -12,7 +12,7 @@ use evtach_core::{Event, Settings};
 use serial2::SerialPort;
 
 use super::Told;
-use crate::measure::{Capacity, ReadingRow, drain, feed, with_tachometer};
+use crate::measure::{Capacity, ReadingRow, Timeline, drain, feed, with_tachometer};
 use crate::recording::Recording;
 
 /// Readings on their way to the screen.
@@ -96,25 +96,32 @@ pub fn file(mut recording: Recording, speed: f64) -> Source {
             let mut first_us = None;
             let mut lost = 0;
             let mut chunk: Vec<Event> = Vec::new();
-            let mut end = "the recording has ended".to_owned();
+            let (mut timeline, mut end) = (Timeline::default(), Told::End);
             loop {
                 chunk.clear();
                 let more = recording.read_chunk(&mut chunk).unwrap_or_else(|error| {
-                    end = error.to_string();
+                    end = Told::Failure(error.to_string());
                     false
                 });
                 tachometer.lost(recording.lost() - lost);
                 lost = recording.lost();
                 for piece in chunk.chunk_by(|a, b| a.t_us / PIECE_US == b.t_us / PIECE_US) {
                     let Some(last) = piece.last() else { continue };
+                    // No piece is as long as a clock is set back by.
+                    if timeline.part(piece) == 0 {
+                        timeline.set_back_to(piece[0].t_us);
+                        timeline.part(piece);
+                    }
                     let first_us = *first_us.get_or_insert(piece[0].t_us);
-                    let due_s = last.t_us.saturating_sub(first_us) as f64 * 1e-6 / speed;
+                    let since_us = timeline.at(last.t_us).saturating_sub(first_us);
+                    let due_s = since_us as f64 * 1e-6 / speed;
                     wait(teller, start, due_s);
                     if teller.stopped() {
                         return;
                     }
                     feed(tachometer, piece, &mut &[][..], |reading| {
-                        teller.tell(Told::Reading(ReadingRow::new(&reading, first_us)));
+                        let laid = timeline.laid(reading);
+                        teller.tell(Told::Reading(ReadingRow::new(&laid, first_us)));
                     });
                 }
                 if !more {
@@ -123,10 +130,10 @@ pub fn file(mut recording: Recording, speed: f64) -> Source {
             }
             tachometer.finish();
             drain(tachometer, |reading| {
-                let first_us = first_us.unwrap_or_default();
-                teller.tell(Told::Reading(ReadingRow::new(&reading, first_us)));
+                let (laid, first_us) = (timeline.laid(reading), first_us.unwrap_or_default());
+                teller.tell(Told::Reading(ReadingRow::new(&laid, first_us)));
             });
-            teller.tell(Told::End(end));
+            teller.tell(end);
         });
     })
 }
@@ -161,7 +168,7 @@ pub fn port(path: &Path, baud: u32) -> Result<Source, SourceError> {
 fn listen_to(mut port: impl Read + Write + Send + 'static) -> Source {
     Source::start(move |teller| {
         if let Err(error) = listen(&mut port, teller) {
-            teller.tell(Told::End(format!("the port failed: {error}; check the cable")));
+            teller.tell(Told::Failure(format!("the port failed: {error}; check the cable")));
         }
         port.write_all(b"SYST:LOG OFF\n").ok();
     })
@@ -262,7 +269,7 @@ mod tests {
         let source = file(recording::open(&demo, &OpenOptions::default())?, 1e6);
         let told: Vec<Told> = source.told.iter().collect();
         let (last, readings) = told.split_last().expect("something was told");
-        assert_eq!(last, &Told::End("the recording has ended".into()));
+        assert_eq!(last, &Told::End);
         assert!(
             readings
                 .iter()
