@@ -11,16 +11,27 @@ const TICK_US: u64 = 10_000;
 /// How often it is given a picture: as the device does, four times a second.
 const PICTURE_US: u64 = 250_000;
 
+/// What was played of a recording.
+#[derive(Debug)]
+pub struct Played {
+    /// From the first event to the last that was played.
+    pub duration_us: u64,
+    /// Whether it was played to its end.
+    pub is_whole: bool,
+    /// The damage that the recording ends with.
+    pub damage: Option<RecordingError>,
+}
+
 /// Plays a recording with the device's memory until its end, or until `until_us` microseconds after its first event.
 ///
 /// # Errors
 ///
-/// When the recording is damaged before its first event; after that, what came before it is played, and the damage returned.
+/// When the recording is damaged before its first event; after that, what came before it is played.
 pub fn play(
     recording: &mut Recording,
     instrument: &mut Instrument,
     until_us: Option<u64>,
-) -> Result<Option<RecordingError>, RecordingError> {
+) -> Result<Played, RecordingError> {
     let mut settings = Settings::new(recording.geometry);
     settings.blades = instrument.preferences().blades;
     instrument.set_sensor(Sensor::Present);
@@ -28,23 +39,31 @@ pub fn play(
         let mut player =
             Player { tachometer, instrument, traffic: Traffic::default(), picture_us: None };
         let mut chunk: Vec<Event> = Vec::new();
-        let (mut end_us, mut damage) = (None, None);
+        let (mut first_us, mut played) =
+            (None, Played { duration_us: 0, is_whole: true, damage: None });
         loop {
             chunk.clear();
             let read = recording.read_chunk(&mut chunk);
-            if let (Some(first), Some(until_us)) = (chunk.first(), until_us) {
-                let end_us = *end_us.get_or_insert(first.t_us.saturating_add(until_us));
-                chunk.truncate(chunk.partition_point(|event| event.t_us <= end_us));
+            if let Some(first) = chunk.first() {
+                let first_us = *first_us.get_or_insert(first.t_us);
+                let since_us = |event: &Event| event.t_us.saturating_sub(first_us);
+                if let Some(until_us) = until_us {
+                    let wanted = chunk.partition_point(|event| since_us(event) <= until_us);
+                    played.is_whole &= wanted == chunk.len();
+                    chunk.truncate(wanted);
+                }
+                let latest_us = chunk.last().map_or(0, since_us);
+                played.duration_us = played.duration_us.max(latest_us);
             }
             player.lost(recording.lost());
             player.events(&chunk);
-            let cut = end_us.is_some() && chunk.is_empty();
+            let cut = until_us.is_some() && chunk.is_empty();
             match read {
                 Ok(true) if !cut => {}
                 Ok(_) => break,
                 Err(error) if player.traffic.events == 0 => return Err(error),
                 Err(error) => {
-                    damage = Some(error);
+                    played.damage = Some(error);
                     break;
                 }
             }
@@ -53,7 +72,7 @@ pub fn play(
         if until_us.is_none() {
             player.finish();
         }
-        Ok(damage)
+        Ok(played)
     })
 }
 

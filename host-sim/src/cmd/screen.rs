@@ -1,9 +1,10 @@
 //! `evtach screen`: what the device would show of a recording, drawn by its own code.
 
+use std::ffi::OsStr;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::Context as _;
+use anyhow::{Context as _, bail};
 use evtach_firmware::instrument::{Action, Instrument, Mode, Page, Preferences, Unit};
 use evtach_firmware::ui::Screen;
 use evtach_host::frame::Frame;
@@ -96,6 +97,10 @@ impl Args {
 /// Runs the subcommand: 0 when the screen shows a speed, else 1.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     keep_apart(&args.file, &args.out)?;
+    let ending = args.out.extension().map(OsStr::to_ascii_lowercase).unwrap_or_default();
+    if !ending.is_empty() && ending != "png" {
+        bail!("{}: a screen is a PNG; end its name in .png", args.out.display());
+    }
     let name = args.file.display().to_string();
     let mut recording =
         recording::open(&args.file, &args.stated.into()).with_context(|| name.clone())?;
@@ -104,9 +109,13 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     }
     let mut instrument = Instrument::new(args.preferences());
     let until_us = args.at.map(|seconds| (seconds * 1e6) as u64);
-    let damage = play(&mut recording, &mut instrument, until_us).with_context(|| name.clone())?;
-    if let Some(error) = damage {
-        eprintln!("{name}: {error}; played what came before");
+    let played = play(&mut recording, &mut instrument, until_us).with_context(|| name.clone())?;
+    if let Some(damage) = played.damage {
+        eprintln!("{name}: {damage}; played what came before");
+    }
+    if until_us.is_some() && played.is_whole {
+        let end_s = played.duration_us as f64 * 1e-6;
+        eprintln!("{name}: ends {end_s:.3} s after its first event, before --at");
     }
     note(&recording, &name);
     in_order(&recording, &name)?;

@@ -11,7 +11,6 @@
 
 mod args;
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -34,7 +33,7 @@ pub struct Args {
     /// Format, where the extension does not tell: evt2, evt3, dat, aedat4, csv, npy, es, spi, ev8.
     #[arg(long)]
     format: Option<WriteFormat>,
-    /// Where the truth goes [default: beside the recording; nowhere for `-`].
+    /// Where the truth goes [default: beside the recording; nowhere for `-`]; `-` is stdout.
     #[arg(long)]
     truth: Option<PathBuf>,
     /// Scene to start from.
@@ -91,10 +90,14 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         spinner.finish_and_clear();
         made?
     };
+    let truth = args.truth.clone().or_else(|| truth_path(&args.out));
+    let stdout = Path::new("-");
+    if args.out == stdout && truth.as_deref() == Some(stdout) {
+        bail!("stdout takes either the recording or its truth; give one of them a name");
+    }
     let mut writer = create(&args.out, format, geometry)?;
     write(&mut writer, &made)?;
     writer.finish()?;
-    let truth = args.truth.clone().or_else(|| truth_path(&args.out));
     if let Some(path) = &truth {
         keep_apart(&args.out, path)?;
         write_truth(path, &made)?;
@@ -168,10 +171,12 @@ fn write_truth(path: &Path, made: &Synthetic) -> anyhow::Result<()> {
         let samples = made.gyro.iter().map(|s| (s.t_us, s.roll_rad_s)).collect::<Vec<_>>();
         value["gyro_us_rad_s"] = serde_json::to_value(samples)?;
     }
-    let mut file = std::fs::File::create(path)
-        .with_context(|| format!("{}: cannot be created; choose --truth", path.display()))?;
-    writeln!(file, "{}", serde_json::to_string_pretty(&value)?)?;
-    Ok(())
+    let text = format!("{}\n", serde_json::to_string_pretty(&value)?);
+    if path == Path::new("-") {
+        return say(text);
+    }
+    std::fs::write(path, text)
+        .with_context(|| format!("{}: cannot be written; choose --truth", path.display()))
 }
 
 fn scene(args: &Args) -> anyhow::Result<Scene> {

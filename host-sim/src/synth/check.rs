@@ -136,6 +136,8 @@ impl Sensor {
         let (noise, hot) = (self.noise_hz, self.hot_hz);
         check("sensor.noise_hz", noise, (0.0..=1e4).contains(&noise), "0 to 10000")?;
         check("sensor.hot_hz", hot, (0.0..=1e5).contains(&hot), "0 to 100000")?;
+        let count = self.hot_pixels;
+        check("sensor.hot_pixels", count.into(), count <= 10_000, "0 to 10000")?;
         let (dropout, blur) = (self.dropout, self.blur_px);
         check("sensor.dropout", dropout, (0.0..=1.0).contains(&dropout), "0 to 1")?;
         check("sensor.blur_px", blur, (0.1..=5.0).contains(&blur), "0.1 to 5")?;
@@ -157,7 +159,8 @@ impl Background {
     fn check(&self) -> Result<(), SceneError> {
         let (contrast, grain) = (self.contrast, self.grain_px);
         check("background.contrast", contrast, (0.0..=10.0).contains(&contrast), "0 to 10")?;
-        check("background.grain_px", grain, (1.0..=200.0).contains(&grain), "1 to 200")
+        check("background.grain_px", grain, (1.0..=200.0).contains(&grain), "1 to 200")?;
+        check("background.boxes", self.boxes.into(), self.boxes <= 1000, "0 to 1000")
     }
 }
 

@@ -74,3 +74,22 @@ fn before_the_first_window_there_is_no_speed() {
 fn a_pipe_is_told_what_serves_it_instead_of_watch() {
     assert_refused_as_bad(&evtach(&["watch", &demo()], b""), "evtach measure --json");
 }
+
+#[test]
+fn a_moment_past_the_end_is_told() {
+    let folder = TempDir::new().expect("a folder");
+    let out = folder.path().join("end.png").display().to_string();
+    let run = |at: &str| evtach(&["screen", &demo(), &out, "--at", at], b"").stderr;
+    let told = "ends 0.200 s after its first event";
+    assert!(run("7").contains(told), "{}", run("7"));
+    assert!(!run("0.19").contains("ends "), "{}", run("0.19"));
+}
+
+/// What a name ends in is what the file holds.
+#[test]
+fn pictures_are_not_written_under_names_of_others() {
+    let demo = demo();
+    assert_refused_as_bad(&evtach(&["screen", &demo, "out.jpg"], b""), "end its name in .png");
+    let plot = evtach(&["plot", &demo, "--out", "out.png"], b"");
+    assert_refused_as_bad(&plot, "end its name in .html or .svg");
+}

@@ -36,7 +36,7 @@ impl Sink for DatWriter {
                 return Err(RecordingError::DoesNotFit {
                     format: "DAT",
                     what: format!("the time {} us", event.t_us),
-                    advice: "let the recording begin at zero: convert with --rebase",
+                    advice: "let the recording begin at zero, with --rebase, or write a part of it with --end",
                 });
             };
             // It would be read as time that wraps.

@@ -48,7 +48,7 @@ impl Sink for EsWriter {
             if step_us > MAX_PAUSE_US {
                 return does_not_fit(
                     format!("a pause of {step_us} us"),
-                    "let the recording begin at zero: convert with --rebase",
+                    "let the recording begin at zero, with --rebase, or write a part of it with --end",
                 );
             }
             let Some(y) = (self.height_px - 1).checked_sub(event.y) else {

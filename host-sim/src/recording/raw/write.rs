@@ -33,7 +33,7 @@ fn too_late(format: &'static str, t_us: u64) -> RecordingError {
     RecordingError::DoesNotFit {
         format,
         what: format!("the time {t_us} us"),
-        advice: "let the recording begin at zero: convert with --rebase",
+        advice: "let the recording begin at zero, with --rebase, or write a part of it with --end",
     }
 }
 
