@@ -3,6 +3,9 @@
 /// Rotors in one reading.
 pub const MAX_ROTORS: usize = 8;
 
+/// Most blades that a person may state: more do not get rings of their own.
+pub const MOST_STATED_BLADES: u8 = 32;
+
 /// Events in the device's store: 16 384 x 8 B = 128 KiB.
 pub const DEVICE_EVENTS: usize = 16_384;
 

@@ -145,7 +145,7 @@ impl Turn {
 
     /// (sine, cosine), absolute error below 2e-7.
     #[must_use]
-    // Not inlined: it is called in two dozen places.
+    // Not inlined: flash is short.
     #[inline(never)]
     pub fn sin_cos(self) -> (f32, f32) {
         let quadrant = self.0.wrapping_add(0x2000_0000) >> 30;
@@ -176,7 +176,7 @@ impl TurnRate {
 
     /// From rad/s.
     #[must_use]
-    // Not inlined: it is called in eight places.
+    // Not inlined: flash is short.
     #[inline(never)]
     pub fn from_rad_s(omega_rad_s: f32) -> Self {
         // The product's rounding is 6e-8 relative: 0.06 ppm, the f32 speed's own resolution.

@@ -35,7 +35,7 @@ pub struct Settings {
     pub geometry: Geometry,
     /// Part of the sensor to look at.
     pub roi: Option<Roi>,
-    /// Blade count, when it is known; `None` finds it.
+    /// Blade count, when it is known, 1 to [`MOST_STATED_BLADES`](crate::limits::MOST_STATED_BLADES); `None` finds it.
     pub blades: Option<u8>,
     /// Length of the window in microseconds; `None` adapts it to the rotor.
     pub window_us: Option<u32>,

@@ -55,7 +55,7 @@ impl Cut {
     }
 
     /// Takes the most of so many events; the number of all that there are.
-    // Not inlined: it is called twice.
+    // Not inlined: flash is short.
     #[inline(never)]
     fn take(
         &self,

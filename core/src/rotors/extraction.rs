@@ -241,7 +241,7 @@ pub struct View<'a> {
 
 impl Extraction {
     /// Searches outside this rotor only.
-    // Not inlined: it is called in several places.
+    // Not inlined: flash is short.
     #[inline(never)]
     pub fn leave_out(&mut self, known: Disc) {
         self.taken.push(covered(known)).ok();
@@ -311,7 +311,7 @@ impl Extraction {
         self.in_step
     }
 
-    // Not inlined: it is called in eight places.
+    // Not inlined: flash is short.
     #[inline(never)]
     fn end(&mut self) {
         let nothing = self.candidates.is_empty() && self.taken.is_empty();
@@ -325,7 +325,7 @@ impl Extraction {
     }
 
     /// Ends with the candidates that there are.
-    // Nor this, in six.
+    // Nor this.
     #[inline(never)]
     fn done(&mut self) {
         // A piece of a rotor, or a rotor by the line of its neighbour, explains fewer events than the rotor by
@@ -351,7 +351,7 @@ impl Extraction {
     }
 
     /// Enters a candidate; when the list is full, in place of the one that explains least.
-    // Nor this, in four.
+    // Nor this.
     #[inline(never)]
     fn enter(&mut self, candidate: Candidate) {
         if let Err(candidate) = self.candidates.push(candidate)

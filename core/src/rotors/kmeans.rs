@@ -56,7 +56,7 @@ pub struct KMeans {
 
 /// The cluster nearest to a point, and its squared distance.
 #[must_use]
-// Not inlined: it is called in several places.
+// Not inlined: flash is short.
 #[inline(never)]
 pub fn nearest(clusters: &[Cluster], x_px: f32, y_px: f32) -> (usize, f32) {
     let mut best = (0, f32::MAX);

@@ -103,7 +103,7 @@ impl Spectrum {
 }
 
 /// Lowest power of some samples.
-// Not inlined: it is called in two places.
+// Not inlined: flash is short.
 #[inline(never)]
 fn lowest(transform: &[Complex32], from: usize, to: usize) -> f32 {
     let samples = transform.get(from..to.min(transform.len())).unwrap_or(&[]);

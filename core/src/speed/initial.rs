@@ -84,7 +84,7 @@ impl Ladder {
     }
 
     /// Moves a range of the rotor's events of the segment, placed and thinned to about `most`, into a slice.
-    // Not inlined: it is called in three places.
+    // Not inlined: flash is short.
     #[inline(never)]
     fn take(
         &self,
@@ -191,7 +191,7 @@ struct Taken {
 
 /// The median of values, which it sorts.
 #[must_use]
-// Not inlined: it is called in several places.
+// Not inlined: flash is short.
 #[inline(never)]
 pub fn median(values: &mut [f32]) -> Option<f32> {
     sort_few(values, |a, b| a < b);

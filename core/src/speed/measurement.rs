@@ -236,7 +236,7 @@ impl Measurement {
     }
 
     /// Share of the events that keep step with a speed in an angular harmonic, 0 to 1.
-    // Not inlined: it is called in four places, and flash is short.
+    // Not inlined: flash is short.
     #[inline(never)]
     fn in_step(&self, polar: &[PolarEvent], omega_rad_s: f32, harmonic: u32) -> f32 {
         Pattern::learn(polar, self.disc, omega_rad_s, harmonic).coherence()
@@ -256,7 +256,7 @@ impl Measurement {
     }
 
     /// Symmetry periods in the window, and the window that a lock needs.
-    // Not inlined: it is called in several places.
+    // Not inlined: flash is short.
     #[inline(never)]
     fn count_periods(&mut self, window: &Window<'_>) -> f32 {
         let revolutions = self.omega_rad_s.abs() * window.duration_us as f32 * 1e-6 / TAU;

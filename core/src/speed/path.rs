@@ -68,7 +68,7 @@ impl Path {
     }
 
     /// Takes the mean place out of the path and returns it.
-    // Not inlined: it is called twice.
+    // Not inlined: flash is short.
     #[inline(never)]
     pub fn centre(&mut self) -> (f32, f32) {
         let n = (self.knots.len() as f32).max(1.0);
@@ -117,7 +117,7 @@ impl Path {
     }
 
     /// The way through a block.
-    // Not inlined: it is called in several places, and seldom.
+    // Not inlined: flash is short.
     #[inline(never)]
     fn stretch(&self, index: usize) -> Stretch {
         let (Some(a), Some(b)) = (self.knots.get(index), self.knots.get(index + 1)) else {

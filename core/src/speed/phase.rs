@@ -38,7 +38,7 @@ fn phase(event: PolarEvent, rate: TurnRate, harmonic: u32) -> Turn {
 impl Pattern {
     /// Learns the phases at a speed.
     #[must_use]
-    // Not inlined: it is called in two places, and flash is short.
+    // Not inlined: flash is short.
     #[inline(never)]
     pub fn learn(track: &[PolarEvent], disc: Disc, omega_rad_s: f32, harmonic: u32) -> Self {
         let rate = TurnRate::from_rad_s(omega_rad_s);
@@ -55,7 +55,7 @@ impl Pattern {
 
     /// Share of events in step, 0 to 1, corrected for what chance gives.
     #[must_use]
-    // Not inlined: it is called in several places.
+    // Not inlined: flash is short.
     #[inline(never)]
     pub fn coherence(&self) -> f32 {
         let mut in_step = 0.0;
@@ -102,7 +102,7 @@ pub struct Harmonics {
 /// For each ring and polarity, phases of that frequency are summed by the direction of their events, and the Fourier transform over the
 /// directions has all harmonics at once. Cost: about 80 instructions an event, and 60 000.
 #[must_use]
-// Not inlined: it is called in two places.
+// Not inlined: flash is short.
 #[inline(never)]
 pub fn scan(
     angular: &mut AngularSums,

@@ -4,7 +4,7 @@ use crate::math::sqrt;
 
 /// Mean and its standard error from the scatter; `None` for fewer than two values.
 #[must_use]
-// Not inlined: it is called in several places.
+// Not inlined: flash is short.
 #[inline(never)]
 pub fn mean_and_error(values: &[f32]) -> Option<(f32, f32)> {
     if values.len() < 2 {

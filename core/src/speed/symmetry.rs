@@ -54,7 +54,7 @@ pub fn turn_back(angular: &mut AngularSums, track: &[PolarEvent], disc: Disc, om
     }
 }
 
-/// What is left when it is turned so far. Not inlined: it is called in three places.
+/// What is left when it is turned so far. Not inlined: flash is short.
 #[inline(never)]
 fn correlation(powers: &[f32], turns: f32) -> f32 {
     let angle = (turns * 65_536.0) as u32;

@@ -64,7 +64,7 @@ struct Points<'p> {
 
 impl Points<'_> {
     /// Takes from every value the mean over the points that share its offset; how many offsets there are.
-    // Not inlined, like the product: both are called in several places.
+    // Not inlined, like the product: flash is short.
     #[inline(never)]
     fn take_offsets(&self, values: &mut Values) -> usize {
         let mut offsets = 0;

@@ -39,7 +39,7 @@ impl Roll {
     }
 
     /// This and what came behind it.
-    // Not inlined: it is called in four places.
+    // Not inlined: flash is short.
     #[must_use]
     #[inline(never)]
     pub(super) fn and(self, later: Self) -> Self {

@@ -105,7 +105,7 @@ impl Tachometer<'_> {
     }
 
     /// The best status among the rotors, or why there is none.
-    // Not inlined: it is asked twice.
+    // Not inlined: flash is short.
     #[inline(never)]
     fn best_status(&self, account: &Account, rotors: &[RotorReading]) -> Status {
         let lost =

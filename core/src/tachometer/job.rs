@@ -61,7 +61,7 @@ impl Tachometer<'_> {
     }
 
     /// Searches the image outside of what was measured in this window.
-    // Not inlined: it is called in two places.
+    // Not inlined: flash is short.
     #[inline(never)]
     fn search_anew(&mut self) {
         self.candidates.clear();
@@ -77,7 +77,7 @@ impl Tachometer<'_> {
     }
 
     /// Searches the image outside of what was measured, or is going to be.
-    // Not inlined: it is called in three places.
+    // Not inlined: flash is short.
     #[inline(never)]
     fn search(&mut self, mut extraction: Extraction) {
         self.scratch.ready_for_search();
@@ -225,7 +225,7 @@ impl Tachometer<'_> {
 }
 
 /// Enters what is to be measured, unless it stands there, while there is room.
-// Not inlined: it is called in three places.
+// Not inlined: flash is short.
 #[inline(never)]
 fn suspect(suspects: &mut Vec<Suspect, MAX_SUSPECTS>, found: Found) {
     if suspects.iter().all(|known| known.found.disc != found.disc) {

@@ -1,7 +1,7 @@
 //! What the person chose, kept over power cycles.
 
 /// Largest blade number that can be typed in.
-pub const MAX_BLADES: u8 = 32;
+pub const MAX_BLADES: u8 = evtach_core::limits::MOST_STATED_BLADES;
 
 /// Largest correction of the sensor's clock in ppm, either way.
 pub const MAX_TRIM_PPM: f32 = 1_000.0;

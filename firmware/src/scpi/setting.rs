@@ -10,14 +10,10 @@ use super::parameter::{Parameter, Parameters};
 use super::response::Response;
 use super::seconds::Seconds;
 use super::speed;
-use crate::instrument::Preferences;
+use crate::instrument::{MAX_BLADES, MAX_TRIM_PPM, Preferences};
 
 /// Largest limit in rpm.
 const MAX_RPM: f32 = 1e6;
-/// Largest blade count that can be typed in.
-const MAX_BLADES: u16 = 32;
-/// Largest correction of the clock in ppm, both ways.
-const MAX_TRIM_PPM: f32 = 1000.0;
 /// Shortest and longest window in seconds.
 const WINDOW_S: (f32, f32) = (0.01, 2.0);
 
@@ -112,7 +108,7 @@ fn blades(parameters: &mut Parameters<'_>) -> Result<Option<u8>, ScpiError> {
             Ok(None)
         }
         Parameter::Word(_) => Err(ScpiError::at(ErrorCode::InvalidCharacterData, place)),
-        Parameter::Number(..) => match parameters.integer(MAX_BLADES)? {
+        Parameter::Number(..) => match parameters.integer(MAX_BLADES.into())? {
             0 => Err(ScpiError::at(ErrorCode::DataOutOfRange, place)),
             blades => Ok(Some(blades as u8)),
         },

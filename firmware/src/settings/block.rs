@@ -14,7 +14,7 @@
 //! their defaults. What cannot be understood that way counts up the generation, and other generations are refused. A
 //! layout by hand, because its bytes are a contract with every firmware to come, and a serialiser's are not.
 
-use crate::instrument::{Alarm, Preferences, Unit};
+use crate::instrument::{Alarm, MAX_BLADES, MAX_TRIM_PPM, Preferences, Unit};
 
 /// Bytes of a block as it is written here.
 pub const BLOCK_BYTES: usize = 16;
@@ -22,8 +22,6 @@ pub const BLOCK_BYTES: usize = 16;
 const GENERATION: u8 = 1;
 const LOW: u8 = 1;
 const HIGH: u8 = 2;
-const MAX_BLADES: u8 = 32;
-const MAX_TRIM_PPM: f32 = 1000.0;
 
 /// Why a block is not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

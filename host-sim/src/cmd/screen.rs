@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context as _, bail};
+use evtach_core::limits::MOST_STATED_BLADES;
 use evtach_firmware::instrument::{Action, Instrument, Mode, Page, Preferences, Unit};
 use evtach_firmware::ui::Screen;
 use evtach_host::frame::Frame;
@@ -35,7 +36,7 @@ pub struct Args {
     #[arg(long, value_enum, default_value = "rpm")]
     unit: UnitName,
     /// Blade count, when it is known.
-    #[arg(long, value_parser = clap::value_parser!(u8).range(1..=32))]
+    #[arg(long, value_parser = clap::value_parser!(u8).range(1..=i64::from(MOST_STATED_BLADES)))]
     blades: Option<u8>,
     #[command(flatten)]
     stated: Stated,

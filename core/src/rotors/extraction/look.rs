@@ -89,7 +89,7 @@ impl Extraction {
     }
 
     /// Starts to look for the rotation that explains a disc.
-    // Not inlined: it is called in five places.
+    // Not inlined: flash is short.
     #[inline(never)]
     pub(super) fn look(&mut self, looked_for: For, disc: Disc) {
         self.looked_for = looked_for;

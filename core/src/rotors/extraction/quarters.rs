@@ -93,7 +93,7 @@ impl Extraction {
     }
 
     /// Collects once more, in other cells; a search in parts does so next time.
-    // Nor this, in three.
+    // Not inlined: flash is short.
     #[inline(never)]
     fn other_cells(&mut self) {
         self.stage = Stage::Visits;
@@ -147,7 +147,7 @@ impl Extraction {
     }
 
     /// Cells of at least this size for what is searched.
-    // Not inlined: it is called in two places.
+    // Not inlined: flash is short.
     #[inline(never)]
     pub(super) fn cells_of(&self, view: &View<'_>, cell_log2: u8) -> CellGrid {
         let Some(number) = self.quarter.checked_sub(1) else { return view.grid };
@@ -167,7 +167,7 @@ impl Extraction {
     }
 
     /// Goes on with the next quarter of the picture, or ends.
-    // Not inlined: it is called in three places.
+    // Not inlined: flash is short.
     #[inline(never)]
     pub(super) fn next_quarter(&mut self) {
         if self.quarter == QUARTERS || self.taken.is_full() {

@@ -56,7 +56,7 @@ impl Measurement {
         }
     }
 
-    // Not inlined: it is called in four places.
+    // Not inlined: flash is short.
     #[inline(never)]
     pub(super) fn plan(&mut self, window: &Window<'_>, periods: f32, effort: Effort) {
         let plan = Pairs::plan(self.pace(), periods, effort, self.events, window.duration_us);
@@ -65,7 +65,7 @@ impl Measurement {
 
     /// The slope whose path the lock's yaws are brought to: where the speed swings, or what the window begins with is not believed. By
     /// less than witnesses may differ it does not matter, and a path that went astray, as in a hand, would bear itself out.
-    // Not inlined: it is called twice.
+    // Not inlined: flash is short.
     #[inline(never)]
     pub(super) fn leading(&self) -> Option<&Slope> {
         let least_rad_s = LOCK_AGREEMENT * self.omega_rad_s.abs();
@@ -75,7 +75,7 @@ impl Measurement {
 
     /// Plans pairs of the lock. Where a slope leads, they lie behind what is not believed, and their yaws are made those of the window's
     /// mean speed wherever in the window they lie. Elsewhere they lie all over the window, and a steady acceleration cancels.
-    // Not inlined: it is called in three places.
+    // Not inlined: flash is short.
     #[inline(never)]
     fn plan_lock_pairs(&mut self, window: &Window<'_>, periods: f32, effort: Effort) {
         self.plan(window, periods, effort);
@@ -152,7 +152,7 @@ impl Measurement {
     }
 
     /// Plans the lock at the longest baseline that cannot slip a period while the speed is known to `sigma_rad_s`.
-    // Not inlined: it is called in three places.
+    // Not inlined: flash is short.
     #[inline(never)]
     pub(super) fn plan_lock(&mut self, window: &Window<'_>, sigma_rad_s: f32) {
         let pace = self.pace();

@@ -127,7 +127,7 @@ impl Measurement {
     }
 
     /// Whether there is an overtone, blurred by less than so many windings.
-    // Not inlined: it is called in two places.
+    // Not inlined: flash is short.
     #[inline(never)]
     pub(super) fn has_overtone_within(&self, windings: f32) -> bool {
         self.pose.has_overtone() && self.pose.sharpness_px() < windings * self.winding_px()
@@ -145,7 +145,7 @@ impl Measurement {
         if self.parts == Some(1) { self.pose.sharpness_px() } else { self.pose.blur_px() }
     }
 
-    // Not inlined: it is called in several places.
+    // Not inlined: flash is short.
     #[inline(never)]
     fn blur_px(&self, most: (f32, f32), jitter_s: f32) -> f32 {
         let radius_px = self.disc.radius_px;

@@ -174,7 +174,7 @@ impl Measurement {
     }
 
     /// Whether the lock bears the phase out, and the rotor is where it should be between whole periods.
-    // Not inlined: it is called in several places.
+    // Not inlined: flash is short.
     #[inline(never)]
     fn bears_out(&self, lock: Estimate, phase: Option<Estimate>) -> bool {
         phase.is_some_and(|phase| {
@@ -236,7 +236,7 @@ impl Measurement {
     }
 
     /// Whether the rotor is also where it should be between whole periods, where an alias is not.
-    // Not inlined: it is called in two places.
+    // Not inlined: flash is short.
     #[inline(never)]
     pub(super) fn fits_between(&self) -> bool {
         let half_way = 0.5 * FRACTION / (self.windings as f32 + 1.0);
@@ -276,7 +276,7 @@ impl Measurement {
 
     /// The reading of a single mark is as good as its axis holds still: what the mark does and what the camera does look alike, where it
     /// is not followed around the turn, or a hand sways as fast as it turns.
-    // Not inlined: it is called in three places.
+    // Not inlined: flash is short.
     #[inline(never)]
     fn widen_mark(&mut self, shake_px: f32) {
         if self.may_be_mark() {
@@ -328,7 +328,7 @@ impl Measurement {
 
 /// Mean weighted by the inverse variances, of witnesses whose errors have something in common, and which may be so many standard
 /// errors apart.
-// Not inlined: it is called in several places.
+// Not inlined: flash is short.
 #[inline(never)]
 fn combine(a: Estimate, b: Estimate, usual_sigmas: f32) -> Estimate {
     let (va, vb) = (a.sigma_rad_s * a.sigma_rad_s, b.sigma_rad_s * b.sigma_rad_s);

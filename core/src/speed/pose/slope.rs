@@ -109,7 +109,7 @@ impl Pose {
 
     /// The trend of the turn, where pixels may not have settled at first: what they tell meanwhile is believed where the rest bears it out
     /// and it tells more. [`Self::slope`] is the trend through all blocks.
-    // Not inlined, for the device's flash.
+    // Not inlined: flash is short.
     #[inline(never)]
     pub(super) fn settled_trend(&self, sums: &Sums) -> Option<Slope> {
         let settled = self.trend_after(self.unsettled_us, sums);
@@ -127,7 +127,7 @@ impl Pose {
 
     /// The trend of what came later than so long after the window's start, as if all before went on as it did, and how the axis wanders;
     /// `None` when too few blocks tell, or the path has slipped.
-    // Not inlined: it is called twice.
+    // Not inlined: flash is short.
     #[inline(never)]
     pub(super) fn trend_after(&self, unsettled_us: f32, sums: &Sums) -> Option<Slope> {
         let count = self.path.blocks();

@@ -30,7 +30,7 @@ impl Template {
     }
 
     /// Share of so many events in step, 0 to 1, corrected for what chance gives.
-    // Not inlined: it is called in three places.
+    // Not inlined: flash is short.
     #[inline(never)]
     pub fn coherence(&self, counts: &Counts) -> f32 {
         let (mut in_step, mut total) = (0.0, 0.0);
