@@ -133,20 +133,17 @@ impl Arrays {
         told: Option<TimeUnit>,
     ) -> Result<String, RecordingError> {
         let Field { array, offset, kind } = self.fields[0];
-        let seen = if kind.is_float() {
-            let stride = self.arrays[array].stride;
-            let times: Vec<f64> = self.arrays[array]
-                .input
-                .peek(stride * 256)?
-                .chunks_exact(stride)
-                .take(256)
-                .map(|record| kind.read(&record[offset..]).as_f64())
-                .collect();
-            let single = kind.bytes <= size_of::<f32>();
-            TimeUnit::from_times(&times, if single { f32::EPSILON.into() } else { f64::EPSILON })
-        } else {
-            Some(TimeUnit::Microseconds)
-        };
+        let stride = self.arrays[array].stride;
+        let times: Vec<f64> = self.arrays[array]
+            .input
+            .peek(stride * 256)?
+            .chunks_exact(stride)
+            .take(256)
+            .map(|record| kind.read(&record[offset..]).as_f64())
+            .collect();
+        let is_single = kind.is_float() && kind.bytes <= size_of::<f32>();
+        let epsilon = if is_single { f32::EPSILON.into() } else { f64::EPSILON };
+        let seen = TimeUnit::from_times(&times, epsilon);
         let (unit, sentence) = TimeUnit::settle(stated, told, "field", seen)?;
         self.unit = unit;
         Ok(sentence)
