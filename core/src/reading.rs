@@ -77,7 +77,7 @@ impl Reason {
             Self::Flicker => "the light flickers: use daylight or a DC lamp",
             Self::Ambiguous => "hold still, fill the view with one rotor, or give the blade count",
             Self::Saturated => "too many events: narrow the view or dim the light",
-            Self::TooSlow => "the rotor turns too slowly for the window",
+            Self::TooSlow => "keep the camera on the rotor for longer",
             Self::TooFast => "the blades pass too fast to be followed",
             Self::Searching => "hold still until the window is full",
             Self::Fault => "restart the device",

@@ -8,8 +8,8 @@ use crate::reading::{Reason, Speed, Status};
 use crate::rotors::{Disc, Found};
 use crate::speed::measurement::Outcome;
 
-/// Readings that a rotor's letter is kept for after it was last seen.
-const REMEMBERED: u8 = 20;
+/// Readings that a rotor's letter is kept for after it was last seen; then another may get it.
+pub const LETTER_READINGS: u8 = 20;
 /// A speed may differ from the one that the beginning of its window told by this much, relative, by so many standard errors, and by what both
 /// accelerations make of the time between: what differs by more tells that one of them is wrong.
 const MOST_JUMP: f32 = 0.02;
@@ -131,7 +131,7 @@ impl Tracker {
         for known in &mut self.known {
             known.missed = known.missed.saturating_add(1);
         }
-        self.known.retain(|known| known.missed <= REMEMBERED);
+        self.known.retain(|known| known.missed <= LETTER_READINGS);
     }
 
     /// The letter of a rotor: that of the nearest known one within half a radius, else the first free. Where its speed contradicts what the

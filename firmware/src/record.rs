@@ -1,4 +1,4 @@
-//! Eight-byte event records: what a sensor bridge sends, and what a recording for the device holds.
+//! Eight-byte event records: what a recording for the device holds, and one of its own.
 //!
 //! All numbers are little-endian. A recording begins with a header of 24 bytes:
 //!
@@ -34,7 +34,7 @@ const MAGIC: [u8; 8] = *b"evtach8\n";
 pub enum HeaderError {
     /// The first bytes are not those of a recording.
     #[error(
-        "byte 0: this is no recording for the device: `evtach bench cost --keep OUT` writes one"
+        "byte 0: this is no recording for the device: `evtach convert FILE OUT.ev8` writes one"
     )]
     Magic,
     /// The sensor size is zero or beyond [`Geometry::MAX_PX`].

@@ -24,7 +24,7 @@ enum Command {
     Convert(cmd::convert::Args),
     /// Make a recording with known truth.
     Synth(Box<cmd::synth::Args>),
-    /// Measured tables: accuracy, cost, speed of decoding.
+    /// Measured tables: accuracy, trust, cost and more.
     Bench(cmd::bench::Args),
     /// A report with pictures.
     Plot(cmd::plot::Args),

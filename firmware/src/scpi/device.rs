@@ -122,7 +122,7 @@ pub trait Device {
     /// Readings so far; wraps.
     fn readings(&self) -> u32;
 
-    /// First event in sensor time, from which log lines count, in microseconds.
+    /// Middle of the first reading in sensor time, from which log lines count, in microseconds.
     fn first_us(&self) -> u64;
 
     /// Whether a speed lies outside of the limits.

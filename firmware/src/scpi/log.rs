@@ -11,7 +11,7 @@ use super::seconds::Seconds;
 pub struct LogLine<'r> {
     /// What was measured.
     pub reading: &'r Reading,
-    /// First event in sensor time, in microseconds.
+    /// What times count from in sensor time, in microseconds.
     pub first_us: u64,
 }
 

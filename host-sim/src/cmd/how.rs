@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, bail};
+use evtach_core::limits::MOST_STATED_BLADES;
 use evtach_core::{Event, Geometry, Reading, Roi, Settings};
 use evtach_host::measure::{Capacity, FileFacts, Plan, Run, Summary, Timeline, summarise};
 use evtach_host::recording;
@@ -16,7 +17,7 @@ use super::{in_order, note};
 #[derive(clap::Args)]
 pub struct How {
     /// Blade count, when it is known.
-    #[arg(long, value_parser = clap::value_parser!(u8).range(1..=64))]
+    #[arg(long, value_parser = clap::value_parser!(u8).range(1..=i64::from(MOST_STATED_BLADES)))]
     blades: Option<u8>,
     /// Look at this part of the sensor only, in pixels.
     #[arg(long, value_name = "X,Y,W,H", value_parser = parse_roi)]

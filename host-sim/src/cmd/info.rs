@@ -9,6 +9,7 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use evtach_core::Event;
+use evtach_host::measure;
 use evtach_host::recording::{self, ImuSample, Recording};
 
 use super::say;
@@ -54,12 +55,12 @@ fn about(file: &Path, args: &Args, told: &mut bool) -> anyhow::Result<()> {
     let options = args.stated.into();
     let mut recording = recording::open(file, &options).with_context(|| name.clone())?;
     let mut statistics = Statistics::new(recording.geometry);
-    let mut imu = Vec::new();
+    let (mut imu, mut timeline) = (Vec::new(), measure::Timeline::default());
     let mut chunk: Vec<Event> = Vec::new();
     let result = loop {
         chunk.clear();
         let more = recording.read_chunk(&mut chunk);
-        chunk.iter().for_each(|event| statistics.add(event));
+        timeline.lay(&chunk, |event| statistics.add(event));
         note_imu(&mut imu, recording.take_imu());
         match more {
             Ok(true) => {}
@@ -70,6 +71,10 @@ fn about(file: &Path, args: &Args, told: &mut bool) -> anyhow::Result<()> {
     let mut text = if *told { "\n".to_owned() } else { String::new() };
     // Writing into a string does not fail.
     let _ = report(&mut text, &name, &recording, &statistics, &imu);
+    if timeline.is_set_back() {
+        let _ =
+            writeln!(text, "note            {}; its parts are laid end to end", timeline.note());
+    }
     say(&text)?;
     *told = true;
     result.with_context(|| name)

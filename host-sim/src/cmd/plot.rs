@@ -39,7 +39,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let mut events: Vec<Event> = Vec::new();
     let measured = args.how.measure(&args.file, |more, timeline| {
-        events.extend(more.iter().map(|event| Event { t_us: timeline.at(event.t_us), ..*event }));
+        events.extend(more.iter().map(|event| timeline.laid_event(event)));
     })?;
     let subject = Subject {
         facts: &measured.facts,

@@ -1,7 +1,6 @@
 //! The mean speed of a rotor over a recording, from readings whose windows overlap and leave gaps.
 
 use std::f64::consts::PI;
-use std::iter;
 use std::ops::Range;
 
 use evtach_core::{Frame, Reading, Speed};
@@ -116,12 +115,13 @@ fn weighted_mean(pieces: &[Piece], of: impl Fn(&Piece) -> f64) -> f64 {
     pieces.iter().map(|p| p.weight() * of(p)).sum::<f64>() / weight
 }
 
-/// Mean speed over `span_us` from readings in their order; `None` without any.
+/// Mean speed over what the readings cover of `span_us`; `None` without any. They are in their order.
 ///
 /// A reading is the turn between its window's ends, so windows laid end to end are exact however the speed varies.
-/// What they leave open is filled in from the line through all and the reading next to it, each as far as it is
-/// known. That is as uncertain as readings scatter about that line, and as the speed swings within a window; and it tells nothing new,
-/// so that what the windows are off by counts for it as well.
+/// What they leave open for no longer than the windows beside it is filled in from the line through all and the reading next to it,
+/// each as far as it is known. That is as uncertain as readings scatter about that line, and as the speed swings within a window; and
+/// it tells nothing new, so that what the windows are off by counts for it as well. Of a longer time nothing is known, not even that the
+/// rotor turned: it is not in the mean.
 pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) -> Option<Speed> {
     pieces.first()?;
     let line = Line::through(pieces, span_us.start);
@@ -146,19 +146,12 @@ pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) 
     let gaps = gaps(&tiles, span_us);
     let open_s: f64 = gaps.iter().map(|gap| seconds(gap.start, gap.end)).sum();
     let weight: f64 = tiles.iter().map(|tile| tile.weight()).sum();
-    let reach_s = match (tiles.first(), tiles.last()) {
-        (Some(first), Some(last)) => seconds(first.window_us.start, last.window_us.end),
-        _ => 0.0,
-    };
     for open_us in gaps {
         let middle_us = open_us.start.midpoint(open_us.end);
         if let Some(near) = pieces.iter().min_by_key(|p| p.middle_us().abs_diff(middle_us)) {
             let length_s = seconds(open_us.start, open_us.end);
             let away_s = seconds(near.middle_us(), middle_us);
-            // Farther away than the windows reach, an acceleration may long have ended.
-            let ended_rad_s = slope_rad_s2 * (away_s.abs() - reach_s).max(0.0);
-            let moved = line.slope_rad_s2.map_or(0.0, |_| away_s * away_s * line.slope_variance)
-                + ended_rad_s * ended_rad_s;
+            let moved = line.slope_rad_s2.map_or(0.0, |_| away_s * away_s * line.slope_variance);
             // How much of what the next reading is off by the line is the speed's, and not its own error.
             let own = scatter / (scatter + near.variance()).max(f64::from(f32::MIN_POSITIVE));
             // What lasts for longer than a window averages out.
@@ -185,16 +178,21 @@ pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) 
     })
 }
 
-/// What windows laid end to end leave open of a span.
+/// What windows laid end to end leave open of a span, and is no longer than the windows beside it.
 fn gaps(tiles: &[&Piece], span_us: &Range<u64>) -> Vec<Range<u64>> {
-    let mut reached_us = span_us.start;
-    let starts = tiles.iter().map(|tile| tile.window_us.clone());
-    let all = starts.chain(iter::once(span_us.end..span_us.end)).map(|window_us| {
-        let open_us = reached_us..window_us.start.max(reached_us);
-        reached_us = window_us.end;
-        open_us
+    let (Some(first), Some(last)) = (tiles.first(), tiles.last()) else { return Vec::new() };
+    let ends = [
+        (span_us.start..first.window_us.start, first.length_us()),
+        (last.window_us.end..span_us.end, last.length_us()),
+    ];
+    let between = tiles.windows(2).map(|pair| {
+        let open_us = pair[0].window_us.end..pair[1].window_us.start;
+        (open_us, pair[0].length_us() + pair[1].length_us())
     });
-    all.filter(|open_us| !open_us.is_empty()).collect()
+    let all = between.chain(ends);
+    all.filter(|(open_us, most_us)| !open_us.is_empty() && open_us.end - open_us.start <= *most_us)
+        .map(|(open_us, _)| open_us)
+        .collect()
 }
 
 /// What windows laid end to end cover, and the variance of the turn in them.
@@ -359,31 +357,36 @@ mod tests {
                 assert!((mean.omega_sigma_rad_s / sigma_rad_s - 1.0).abs() < 0.01, "{mean:?}");
             }
         }
-        // An acceleration that a single window told, for a quarter of an hour.
-        let mut turning = piece(0);
-        turning.speed.alpha_rad_s2 = Some(1.0);
-        let mean = mean_speed(&[turning], &(0..1_000_000_000), 0.0).expect("a reading");
-        assert!(mean.omega_sigma_rad_s > 100.0, "{mean:?}");
     }
 
     #[test]
-    fn an_acceleration_that_may_have_ended_is_in_the_error() {
-        // Sped up for 0.6 s and seen no more; what came after may be as it was at the end.
-        let pieces: Vec<Piece> = (0..4)
-            .map(|i| {
-                let speed = Speed {
-                    omega_rad_s: 100.0 + 4.5 * i as f32,
-                    omega_sigma_rad_s: 0.002,
-                    alpha_rad_s2: Some(30.0),
-                    frame: Frame::Camera,
-                };
-                Piece { window_us: i * 150_000..(i + 1) * 150_000, speed, swing_rad_s: 0.0 }
-            })
-            .collect();
-        let mean = |until_us| mean_speed(&pieces, &(0..until_us), 0.0).expect("readings");
-        assert!(mean(650_000).omega_sigma_rad_s < 0.01, "{:?}", mean(650_000));
-        let late = mean(20_000_000);
-        assert!(late.omega_rad_s - 115.75 < 2.0 * late.omega_sigma_rad_s, "{late:?}");
+    fn what_is_open_for_long_is_not_in_the_mean() {
+        // Sped up for 0.6 s, once more at 2 s for as long, and then for good: seen and not to be seen in between.
+        let piece = |start_us: u64| {
+            let speed = Speed {
+                omega_rad_s: 100.0 + 30e-6 * (start_us + 75_000) as f32,
+                omega_sigma_rad_s: 0.002,
+                alpha_rad_s2: Some(30.0),
+                frame: Frame::Camera,
+            };
+            Piece { window_us: start_us..start_us + 150_000, speed, swing_rad_s: 0.0 }
+        };
+        let pieces: Vec<Piece> =
+            [0, 150_000, 300_000, 450_000, 2_000_000, 2_150_000].map(piece).into();
+        let mean = |pieces: &[Piece], until_us| {
+            let mean = mean_speed(pieces, &(0..until_us), 0.0).expect("readings");
+            (mean.omega_rad_s, mean.omega_sigma_rad_s)
+        };
+        // Up to 0.6 s, or to an end that is near.
+        for (until_us, expected_rad_s) in [(20_000_000, 109.0), (700_000, 110.5)] {
+            let (mean_rad_s, sigma_rad_s) = mean(&pieces[..4], until_us);
+            assert!((mean_rad_s - expected_rad_s).abs() < 0.01, "{mean_rad_s} {sigma_rad_s}");
+            assert!(sigma_rad_s < 0.02, "{sigma_rad_s}");
+        }
+        // And from 2 to 2.3 s.
+        let (mean_rad_s, _) = mean(&pieces, 20_000_000);
+        let expected_rad_s = (0.6 * 109.0 + 0.3 * (100.0 + 30.0 * 2.15)) / 0.9;
+        assert!((mean_rad_s - expected_rad_s).abs() < 0.01, "{mean_rad_s} {expected_rad_s}");
     }
 
     #[test]
@@ -395,9 +398,9 @@ mod tests {
             frame: Frame::Camera,
         };
         let pieces = [Piece { window_us: 0..300_000, speed, swing_rad_s: 0.0 }];
-        let mean = mean_speed(&pieces, &(0..900_000), 0.0).expect("a reading");
-        // 200 rad/s at 0.15 s, and so 203 at the middle.
-        assert!((mean.omega_rad_s - 203.0).abs() < 1e-3, "{}", mean.omega_rad_s);
+        let mean = mean_speed(&pieces, &(0..600_000), 0.0).expect("a reading");
+        // 200 rad/s at 0.15 s, and so 201.5 in the middle.
+        assert!((mean.omega_rad_s - 201.5).abs() < 1e-3, "{}", mean.omega_rad_s);
         assert_eq!(mean.alpha_rad_s2, Some(10.0));
     }
 

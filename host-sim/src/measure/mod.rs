@@ -1,6 +1,7 @@
 //! From a recording to readings: the device's own tachometer over a file.
 
 mod json;
+mod letters;
 mod mean;
 mod run;
 mod summary;

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use evtach_core::{Event, GyroSample, Reading, Settings};
 
+use super::letters::Letters;
 use super::wait::Wait;
 use super::{Capacity, FileFacts, Ties, Timeline, drain, feed, with_tachometer};
 use crate::recording::{ImuSample, Recording, RecordingError};
@@ -60,23 +61,36 @@ impl Run {
         let mut parts = Parts::of(recording, plan.capacity);
         let out_of_order = with_tachometer(plan.settings, plan.capacity, |tachometer| {
             let since_us = plan.since_us.clone();
-            let mut chosen = Chosen { since_us, origin_us: None, facts: &mut facts, seen };
+            let mut chosen = Chosen {
+                since_us,
+                origin_us: None,
+                is_inside: plan.since_us.start == 0,
+                facts: &mut facts,
+                seen,
+            };
             let (mut part, mut known_lost) = (Vec::new(), 0);
+            let mut letters = Letters::default();
             let (mut rolls, mut wait) = (Vec::<GyroSample>::new(), Wait::default());
             while !parts.is_done() {
                 let set_back_us = parts.next(&mut part);
                 chosen.leave(&mut part, &parts.timeline);
-                let lost = parts.recording.lost();
-                tachometer.lost(lost - known_lost);
-                known_lost = lost;
+                let lost = parts.recording.lost() - known_lost;
+                known_lost += lost;
+                if chosen.is_inside {
+                    tachometer.lost(lost);
+                    chosen.facts.lost += lost;
+                }
                 let samples = parts.recording.take_imu();
                 if plan.takes_gyro {
                     has_gyro |= !samples.is_empty();
                     rolls.extend(samples.iter().map(ImuSample::roll));
+                    rolls.retain(|sample| parts.timeline.is_of_part(sample.t_us));
                     wait.hold(&mut part, &rolls, parts.more && set_back_us.is_none());
                 }
                 let mut ahead = &rolls[..];
-                let mut keep = |reading| readings.push(parts.timeline.laid(reading));
+                let mut keep = |reading| {
+                    readings.push(letters.lettered(parts.timeline.laid(reading)));
+                };
                 feed(tachometer, &part, &mut ahead, &mut keep);
                 let used = rolls.len() - ahead.len();
                 rolls.drain(..used);
@@ -90,13 +104,14 @@ impl Run {
                 }
                 if let Some(t_us) = set_back_us {
                     parts.timeline.set_back_to(t_us);
+                    wait = Wait::default();
                 }
             }
             chosen.facts.thinned = tachometer.thinned();
             tachometer.ignored().out_of_order
         });
         let Parts { timeline, events_read, damage, .. } = parts;
-        facts.lost = recording.lost() + out_of_order;
+        facts.lost += out_of_order;
         Self { facts, readings, events_read, out_of_order, has_gyro, timeline, damage }
     }
 }
@@ -106,6 +121,8 @@ struct Chosen<'a, S> {
     since_us: Range<u64>,
     /// The first event of all.
     origin_us: Option<u64>,
+    /// Whether the last event so far was of the part: what is lost then is lost of it.
+    is_inside: bool,
     facts: &'a mut FileFacts,
     seen: S,
 }
@@ -117,6 +134,8 @@ impl<S: FnMut(&[Event], &Timeline)> Chosen<'_, S> {
         let origin_us = *self.origin_us.get_or_insert(first.t_us);
         self.facts.origin_us = origin_us;
         let since_us = |event: &Event| timeline.at(event.t_us).saturating_sub(origin_us);
+        self.is_inside =
+            events.last().is_some_and(|event| self.since_us.contains(&since_us(event)));
         events.retain(|event| self.since_us.contains(&since_us(event)));
         let (Some(first), Some(last)) = (events.first(), events.last()) else { return };
         if self.facts.events == 0 {

@@ -25,12 +25,38 @@ pub fn table(facts: &FileFacts, summary: &Summary, readings: &[Reading]) -> Stri
         if readings.len() == 1 { "" } else { "s" }
     );
     for rotor in &summary.rotors {
-        let _ = writeln!(text, "  {}", row(rotor));
+        let _ = writeln!(text, "  {}{}", row(rotor), stretch(facts, readings, rotor));
+    }
+    let is_told = |letter: &u8| summary.rotors.iter().any(|rotor| rotor.id == *letter);
+    let spoken = readings.iter().flat_map(|reading| &reading.rotors).filter(|r| r.speed.is_some());
+    let mut brief: Vec<u8> = spoken.map(|rotor| rotor.id).collect();
+    brief.sort_unstable();
+    brief.dedup();
+    brief.retain(|letter| !is_told(letter));
+    if !brief.is_empty() {
+        let letters: Vec<String> = brief.into_iter().map(letter).collect();
+        let _ = writeln!(text, "  for a short time only, see --json: {}", letters.join(", "));
     }
     if let Status::Refused(reason) = summary.status {
         let _ = writeln!(text, "  no reading: {} ({})", reason.as_str(), reason.advice());
     }
     text
+}
+
+/// From when to when a rotor was as well measured as it is told, where that leaves more of the recording open than a window.
+fn stretch(facts: &FileFacts, readings: &[Reading], told: &RotorReading) -> String {
+    let is_it = |rotor: &RotorReading| (rotor.id, rotor.status) == (told.id, told.status);
+    let mut of_it = readings.iter().filter(|reading| reading.rotors.iter().any(is_it));
+    let Some(first) = of_it.next() else { return String::new() };
+    let last = of_it.last().unwrap_or(first);
+    let half_us = |reading: &Reading| u64::from(reading.window_us) / 2;
+    let start_us = first.t_us.saturating_sub(half_us(first));
+    let end_us = last.t_us.saturating_add(half_us(last));
+    let open_us = start_us.saturating_sub(facts.first_us).max(facts.last_us.saturating_sub(end_us));
+    if open_us <= u64::from(first.window_us.max(last.window_us)) {
+        return String::new();
+    }
+    format!("  from {:.2} to {:.2} s", facts.t_s(start_us), facts.t_s(end_us))
 }
 
 /// One rotor in one line.

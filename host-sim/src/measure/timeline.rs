@@ -41,6 +41,33 @@ impl Timeline {
         self.set_back += 1;
     }
 
+    /// Whether what the clock told beside the events belongs to this part: behind the border there may come some of the part before,
+    /// whose clock was ahead by more than half of the least step back.
+    #[must_use]
+    pub fn is_of_part(&self, t_us: u64) -> bool {
+        let ahead_us = t_us.saturating_sub(self.latest_us.unwrap_or(t_us));
+        !self.is_set_back() || ahead_us < CLOCK_RESET_US / 2
+    }
+
+    /// Hands out events with their times laid end to end.
+    pub fn lay(&mut self, events: &[Event], mut each: impl FnMut(&Event)) {
+        let mut rest = events;
+        while let Some(first) = rest.first() {
+            let length = self.part(rest);
+            if length == 0 {
+                self.set_back_to(first.t_us);
+            }
+            rest[..length].iter().for_each(|event| each(&self.laid_event(event)));
+            rest = &rest[length..];
+        }
+    }
+
+    /// An event of this part.
+    #[must_use]
+    pub const fn laid_event(&self, event: &Event) -> Event {
+        Event { t_us: self.at(event.t_us), ..*event }
+    }
+
     /// When something of this part was, in microseconds.
     #[must_use]
     pub const fn at(&self, t_us: u64) -> u64 {
