@@ -7,7 +7,7 @@ use embassy_time::{Duration, with_timeout};
 use evtach_core::{Poll, Reading, Settings, Tachometer};
 
 use crate::cost::{Clock, Costs, Spent};
-use crate::intake::{Block, Pace};
+use crate::intake::{BLOCKS, Block, Pace};
 
 /// Steps of a measurement between two looks at what has arrived.
 pub const STEPS: u32 = 1;
@@ -83,9 +83,12 @@ pub async fn measure<M: RawMutex>(
                 Poll::Ready(reading) => companion.measured(&reading, intake.costs.take_spent()),
             }
             // A sensor goes on while a window is measured; a file waits, and is measured to the end.
-            while !pace.can_wait()
-                && let Some(block) = blocks.try_receive()
-            {
+            // As much as there is room for, and no more: what comes as fast as it is taken in would leave no time to measure.
+            for _ in 0..BLOCKS {
+                if pace.can_wait() {
+                    break;
+                }
+                let Some(block) = blocks.try_receive() else { break };
                 companion.arrived(block);
                 intake.push(block);
                 blocks.receive_done();

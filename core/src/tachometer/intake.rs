@@ -80,17 +80,21 @@ impl Tachometer<'_> {
             let passed = &rest[..gate.admit(rest)];
             if self.overrun {
                 self.ignored.overrun += passed.len() as u64;
-            } else {
+            } else if !passed.is_empty() {
                 self.store_all(passed, weight_log2);
             }
             taken += passed.len();
-            let Some(stopped) = events.get(taken) else { break };
-            match gate.outside(*stopped) {
-                Some(Outside::Sensor) => self.ignored.out_of_bounds += 1,
-                Some(Outside::Roi) => self.ignored.out_of_roi += 1,
-                None => break,
+            let inside = taken;
+            while let Some(place) = events.get(taken).and_then(|event| gate.outside(*event)) {
+                match place {
+                    Outside::Sensor => self.ignored.out_of_bounds += 1,
+                    Outside::Roi => self.ignored.out_of_roi += 1,
+                }
+                taken += 1;
             }
-            taken += 1;
+            if taken == inside {
+                break;
+            }
         }
         if let Some(last) = events[..taken].last() {
             let reached_us = self.last_us + u64::from(gate.since(self.last_us as u32));

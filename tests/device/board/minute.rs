@@ -49,6 +49,30 @@ fn counts(answer: &str) -> Vec<u64> {
     answer.split(',').filter_map(|count| count.parse().ok()).collect()
 }
 
+/// What lies outside of the part that is looked at costs little, and none of the time for measuring.
+#[test]
+fn a_part_of_the_picture_is_looked_at_beside_a_million_events_a_second() {
+    let Some(mut board) = Board::switch_on() else { return };
+    let sees = a_million_a_second();
+    board.run(0.5);
+    board.plug_camera_for_good(Camera::Davis346, &sees, PERIOD_S);
+    board.wait_for(3.0, "SYST:SENS?", |answer| answer.starts_with("\"present\""));
+    assert_eq!(board.query("ROI 0,0,20,20;ROI?"), "0,0,20,20");
+    // What was in the window then is in none.
+    board.run(0.5);
+    let before = counts(&board.query("SYST:EVEN?"));
+    board.run(2.0);
+    assert_eq!(board.query("SYST:FAUL?"), "\"none\",\"\"");
+    let after = counts(&board.query("SYST:EVEN?"));
+    assert_eq!(before.get(2), after.get(2), "events late: {before:?} {after:?}");
+    // A half of the rotor.
+    assert_eq!(board.query("ROI 173,70,90,120;ROI?"), "173,70,90,120");
+    board.wait_for(4.0, "FETC?", |answer| {
+        answer.parse::<f64>().is_ok_and(|rpm| (rpm / RPM - 1.0).abs() < 0.01)
+    });
+    assert_eq!(board.report()["faults"], serde_json::json!([]));
+}
+
 #[test]
 fn a_minute_of_a_million_events_a_second_is_accounted_for_and_none_is_lost() {
     let Some(mut board) = Board::switch_on() else { return };
