@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// Digits shown at most: an f32 holds seven, and the last of them is noise.
+/// Digits shown at most: an f32 holds seven, and the last of them is noise. With a point there is room for one less.
 const MOST_DIGITS: u32 = 6;
 
 /// Decimals shown at most.
@@ -33,8 +33,9 @@ impl Number {
             return Some(Self { scaled, decimals: 0, filled });
         }
         let by_error = (1..MOST_DECIMALS).find(|d| 1.0 / power(*d) <= sigma);
-        let whole_digits = (1..MOST_DIGITS as u8).find(|digits| value < power(*digits));
-        let by_digits = (MOST_DIGITS as u8).saturating_sub(whole_digits.unwrap_or(u8::MAX));
+        // As many as when it is rounded up.
+        let whole_digits = (1..MOST_DIGITS as u8).find(|digits| value + 0.5 < power(*digits));
+        let by_digits = (MOST_DIGITS as u8 - 1).saturating_sub(whole_digits.unwrap_or(u8::MAX));
         let decimals = by_error.unwrap_or(MOST_DECIMALS).min(by_digits);
         Some(Self { scaled: rounded(value * power(decimals)), decimals, filled: 0 })
     }
@@ -71,10 +72,13 @@ impl Number {
 impl fmt::Display for Number {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let one = 10_u32.pow(u32::from(self.decimals));
-        write!(f, "{}", self.scaled / one)?;
+        let whole = self.scaled.checked_div(one).unwrap_or(0);
+        write!(f, "{whole}")?;
         match self.decimals {
             0 => Ok(()),
-            decimals => write!(f, ".{:0>1$}", self.scaled % one, usize::from(decimals)),
+            decimals => {
+                write!(f, ".{:0>1$}", self.scaled - whole * one, usize::from(decimals))
+            }
         }
     }
 }
@@ -103,16 +107,20 @@ mod tests {
     fn digits_end_where_the_error_begins() {
         for (value, sigma, text, filled) in [
             (1180.27, 0.63, "1180.3", 0),
-            (1180.27, 0.063, "1180.27", 0),
+            (1180.27, 0.063, "1180.3", 0),
+            (180.27, 0.063, "180.27", 0),
             (1180.27, 6.3, "1180", 0),
             (1184.0, 12.0, "1180", 1),
             (1161.0, 163.0, "1200", 2),
-            (59_999.96, 0.5, "60000.0", 0),
-            (59_999.0, 0.001, "59999.0", 0),
+            (59_999.96, 0.5, "60000", 0),
+            (9_999.97, 0.001, "10000", 0),
+            (9_998.97, 0.001, "9999.0", 0),
+            (99_999.7, 0.001, "100000", 0),
+            (299_999.0, 0.001, "299999", 0),
             (0.5, 0.01, "0.50", 0),
             (9.999_9, 0.001, "10.000", 0),
             (19.671, 0.0, "19.671", 0),
-            (104.719, 0.000_1, "104.719", 0),
+            (104.719, 0.000_1, "104.72", 0),
         ] {
             assert_eq!(shown(value, sigma), Some((text.into(), filled)), "{value} ± {sigma}");
         }

@@ -104,7 +104,7 @@ pub fn draw_details<D: DrawTarget<Color = Rgb565>>(
     } else if let Some(direction) = view.direction {
         draw_turning(target, left, direction, view)?;
     }
-    if let Some(speed) = view.speed {
+    if let Some(speed) = view.speed.filter(|_| view.state.has_speed()) {
         let mut error = String::<16>::new();
         write!(error, "± {}", speed.error).ok();
         let right = Point::new(RIGHT, DETAILS_BASELINE);
