@@ -29,7 +29,8 @@ pub fn draw(frame: &mut Frame<'_>, monitor: &Monitor, now: Duration) {
     .areas(frame.area());
     let latest = monitor.latest(now);
     frame.render_widget(title(monitor, latest), top);
-    frame.render_widget(speed_line(monitor, latest), speed);
+    let rotor = monitor.rotor().filter(|_| !monitor.is_gone(now));
+    frame.render_widget(speed_line(rotor, latest), speed);
     draw_trend(frame, monitor, trend);
     if let Some((reading, _)) = latest {
         frame.render_widget(rotor_table(reading), table);
@@ -68,8 +69,7 @@ fn colour(status: &str, fresh: bool) -> Color {
 }
 
 /// The speed of the rotor chosen, or dashes.
-fn speed_line<'m>(monitor: &'m Monitor, latest: Option<(&ReadingRow, bool)>) -> Paragraph<'m> {
-    let rotor = monitor.rotor();
+fn speed_line<'m>(rotor: Option<&RotorRow>, latest: Option<(&ReadingRow, bool)>) -> Paragraph<'m> {
     let (value, error) = rotor.and_then(digits).unzip();
     let fresh = latest.is_some_and(|(_, fresh)| fresh);
     let style = if fresh { Style::new().bold() } else { Style::new().fg(Color::DarkGray) };

@@ -10,6 +10,9 @@ const KEPT: usize = 600;
 /// Without a reading for this long, the last one is no longer of the present.
 const OLD: Duration = Duration::from_secs(2);
 
+/// Without one for this long, nothing is known of the present.
+const GONE: Duration = Duration::from_secs(4);
+
 /// What a source tells.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Told {
@@ -116,6 +119,12 @@ impl Monitor {
     pub fn latest(&self, now: Duration) -> Option<(&ReadingRow, bool)> {
         let fresh = self.ended || now.saturating_sub(self.last) <= OLD;
         self.readings.back().map(|reading| (reading, fresh))
+    }
+
+    /// Whether the last reading is so old that its number gives way to dashes.
+    #[must_use]
+    pub fn is_gone(&self, now: Duration) -> bool {
+        !self.ended && now.saturating_sub(self.last) > GONE
     }
 
     /// The rotor chosen, in the last reading.

@@ -71,6 +71,8 @@ fn a_device_that_falls_silent_is_held() {
     monitor.take(reading(0.5, vec![rotor("A", Some(1180.3), None)]), Duration::from_secs(1));
     assert!(drawn(&monitor, 2.9).contains("0.5 s   locked"));
     assert!(drawn(&monitor, 3.1).contains("0.5 s   held"));
+    assert!(drawn(&monitor, 4.9).contains("1180.3"));
+    assert!(drawn(&monitor, 5.1).contains("-----"));
 }
 
 #[test]
