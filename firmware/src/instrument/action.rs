@@ -189,8 +189,9 @@ impl Instrument {
     }
 
     fn set_alarm(&mut self, alarm: Alarm) {
-        if alarm.is_valid() {
+        if alarm.is_valid() && alarm != self.preferences.alarm {
             self.preferences.alarm = alarm;
+            self.alarm = None;
         }
     }
 

@@ -257,7 +257,6 @@ impl Instrument {
             speed.omega_rad_s *= trim;
             speed.omega_sigma_rad_s *= trim;
         }
-        self.readings = self.readings.wrapping_add(1);
         let measured = || reading.rotors.iter().filter_map(|r| Some((r.id, Rpm::of(r)?)));
         self.tallies.add(reading.t_us, measured());
         let until_us = end_us(&reading).saturating_add(fresh_us(reading.window_us));
@@ -267,6 +266,7 @@ impl Instrument {
         if self.mode == Mode::Hold {
             return;
         }
+        self.readings = self.readings.wrapping_add(1);
         if self.latest.as_ref().is_some_and(|latest| reading.t_us < latest.t_us) {
             // The sensor's clock began anew: what was before has no place on its time.
             (self.first_us, self.last_speed, self.now_us) = (None, None, 0);

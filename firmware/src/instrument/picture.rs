@@ -73,7 +73,7 @@ impl Picture {
 fn hot(counts: &[u16]) -> u16 {
     let mut by_size = [0_u32; 17];
     for count in counts.iter().filter(|count| **count > 0) {
-        by_size[count.ilog2() as usize + 1] += 1;
+        by_size[(u16::BITS - count.leading_zeros()) as usize] += 1;
     }
     let used: u32 = by_size.iter().sum();
     let mut above = 0;

@@ -6,6 +6,9 @@ use evtach_core::limits::MAX_ROTORS;
 use evtach_core::{RotorReading, Speed};
 use heapless::Vec;
 
+/// Readings farther apart leave a gap between them: a camera that sees nothing gives none.
+const MOST_GAP_US: u64 = 2_000_000;
+
 /// A speed with its standard error, both in revolutions per minute.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Rpm {
@@ -65,7 +68,7 @@ impl Tally {
         let share = 1.0 / self.readings as f32;
         self.mean_rpm += (rpm.value - self.mean_rpm) * share;
         self.mean_variance += (rpm.sigma * rpm.sigma - self.mean_variance) * share;
-        if self.running && t_us > self.last_us {
+        if self.running && (1..=MOST_GAP_US).contains(&t_us.saturating_sub(self.last_us)) {
             // The trapezoid under the speed: exact while it changes evenly from reading to reading.
             let mean_rad_s = 0.5 * (self.last.value + rpm.value) / Speed::RPM_PER_RAD_S;
             let turned = mean_rad_s * (t_us - self.last_us) as f32 / TAU;
@@ -140,7 +143,8 @@ impl Tallies {
                 continue;
             }
             if self.0.is_full()
-                && let Some(oldest) = (0..self.0.len()).min_by_key(|i| self.0[*i].last_us)
+                && let Some((oldest, _)) =
+                    self.0.iter().enumerate().min_by_key(|(_, tally)| tally.last_us)
             {
                 self.0.swap_remove(oldest);
             }

@@ -169,8 +169,11 @@ fn hold_freezes_number_picture_trend_and_time_together() {
     let held = it.view();
     assert_eq!((held.mode, held.state), (Mode::Hold, State::Locked));
 
+    let readings = it.readings();
     tick(&mut it, 9_000_000);
     see(&mut it, &locked(9_000_000, 2000.0));
+    // Nobody is told of a new reading, where there is the held one.
+    assert_eq!(it.readings(), readings);
     let mut counts = [9; 64];
     let geometry = evtach_core::Geometry { width_px: 32, height_px: 32 };
     let heat = evtach_core::rotors::HeatMap::new(&mut counts, geometry);
@@ -254,6 +257,9 @@ fn revolutions_count_while_measured_only() {
     assert_eq!(turns(&it), Some(250));
     see(&mut it, &locked(8_500_000, 1200.0));
     assert_eq!(turns(&it), Some(350));
+    // Nothing was to be seen for a while, of which no reading tells.
+    see(&mut it, &locked(20_500_000, 1200.0));
+    assert_eq!(turns(&it), Some(350));
     it.act(Action::Reset);
     assert_eq!(turns(&it), None);
 }
@@ -321,6 +327,11 @@ fn the_alarm_is_on_exactly_while_a_measured_speed_is_beyond_a_limit() {
     it.act(Action::ToggleHold);
     // What was not measured is beyond no limit.
     tick(&mut it, 2_700_001);
+    assert_eq!(it.view().alarm, None);
+    // Nor what was measured beyond another.
+    see(&mut it, &locked(2_800_000, 2500.0));
+    assert_eq!(it.view().alarm, Some((0, Beyond::High)));
+    it.act(Action::Alarm(Alarm { low_rpm: Some(1000.0), high_rpm: Some(3000.0) }));
     assert_eq!(it.view().alarm, None);
     let kept = it.preferences().alarm;
     for wrong in [f32::NAN, f32::INFINITY, 0.0, -5.0] {

@@ -100,7 +100,9 @@ pub fn fetch(
             let reason = match (rotor, reading) {
                 (Some(rotor), _) => rotor.status.reason(),
                 // A rotor that is not there, in a reading of others.
-                (None, Some(reading)) if asked.is_none() => reading.status.reason(),
+                (None, Some(reading)) if asked.or(device.selected()).is_none() => {
+                    reading.status.reason()
+                }
                 (None, Some(_)) => Some(evtach_core::Reason::NoRotation),
                 (None, None) => Some(device.reason()),
             };

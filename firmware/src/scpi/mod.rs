@@ -59,7 +59,8 @@ struct Wait {
 /// One end of the link.
 #[derive(Clone, Debug)]
 pub struct Link {
-    line: Vec<u8, LINE_BYTES>,
+    /// A carriage return is none of it.
+    line: Vec<u8, { LINE_BYTES + 1 }>,
     overrun: bool,
     complete: bool,
     /// Where the next command of the line begins.
@@ -104,10 +105,7 @@ impl Link {
     pub fn receive(&mut self, bytes: &[u8]) -> usize {
         for (index, &byte) in bytes.iter().enumerate() {
             if byte == DEVICE_CLEAR {
-                self.end_line();
-                self.wait = None;
-                self.response.clear();
-                self.block = None;
+                self.forget();
             } else if self.complete {
                 return index;
             } else if byte == b'\n' {
@@ -117,6 +115,17 @@ impl Link {
             }
         }
         bytes.len()
+    }
+
+    /// Forgets the line, the answer and the block under way: control-C came, or nobody fetches them, and whoever does next is not
+    /// to be told the end of them.
+    // Not inlined: flash is short.
+    #[inline(never)]
+    pub fn forget(&mut self) {
+        self.end_line();
+        self.wait = None;
+        self.response.clear();
+        self.block = None;
     }
 
     /// Works until there is something to send, or nothing left to do. To be called after bytes have come, after a
@@ -133,7 +142,12 @@ impl Link {
                 }
                 self.wait = None;
                 self.begin_answer();
-                fetch::speed(wait.rotor, device, &mut self.response);
+                // What stood before is no next speed.
+                if wait.speed && device.readings() == wait.readings {
+                    self.response.number(None);
+                } else {
+                    fetch::speed(wait.rotor, device, &mut self.response);
+                }
             } else if !self.complete {
                 self.log(device);
                 return;

@@ -26,10 +26,10 @@ const BUFFER_BYTES: usize = 64;
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SaveError {
     /// The flash refused.
-    #[error("the flash did not take the preferences: they last until the device is switched off")]
+    #[error("the flash did not take the preferences")]
     Flash,
     /// The pages lent are too few or too small.
-    #[error("the flash region for preferences must be two whole pages or more")]
+    #[error("flash for preferences: two whole pages or more")]
     Region,
 }
 

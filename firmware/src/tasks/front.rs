@@ -3,7 +3,7 @@
 use embassy_time::Instant;
 use embedded_graphics::pixelcolor::Rgb565;
 use embedded_graphics::prelude::DrawTarget;
-use evtach_core::Geometry;
+use evtach_core::{Geometry, Roi};
 use heapless::String;
 
 use super::shared::{Shared, Wanted};
@@ -145,6 +145,11 @@ impl<R: Recording, P: Panel> Front<R, P> {
         while let Ok(reading) = self.shared.readings.try_receive() {
             self.instrument.take_in(reading);
         }
+        // What was asked of another camera.
+        let has = |roi: &Roi, geometry: Geometry| {
+            roi.x + roi.width_px <= geometry.width_px && roi.y + roi.height_px <= geometry.height_px
+        };
+        self.view.roi = self.view.roi.filter(|roi| standing.geometry.is_none_or(|g| has(roi, g)));
         let View { roi, window_us } = self.view;
         let wanted = Wanted { blades: self.instrument.preferences().blades, roi, window_us };
         if wanted != self.told {

@@ -106,7 +106,12 @@ async fn answer<R: Recording, P: Panel>(
             link.transmit(&mut out, front)
         };
         shared.alive(Task::Link);
-        if count == 0 || port.write_all(&out[..count]).await.is_err() {
+        if count == 0 {
+            return;
+        }
+        if port.write_all(&out[..count]).await.is_err() {
+            // Nobody listens: what is left is not for whoever comes next.
+            link.forget();
             return;
         }
     }

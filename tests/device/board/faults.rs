@@ -62,6 +62,22 @@ fn unplugged_without_a_word_from_the_port() {
     unplug_and_replug(Unplug::ErrorsOnly);
 }
 
+/// The PC's cable is pulled while the device sends, and put in again.
+#[test]
+fn a_pc_that_goes_while_it_is_told_something_is_answered_when_it_comes_back() {
+    let Some(mut board) = reading(&one_rotor(1500.0, 3000.0)) else { return };
+    reads(&mut board, 1500.0);
+    board.serial("SYST:LOG ON");
+    board.run(0.5);
+    board.break_("pc unplug");
+    board.run(1.5);
+    board.break_("pc plug");
+    board.run(1.0);
+    board.read();
+    board.wait_for(3.0, "SYST:LOG OFF;*IDN?", |answer| answer.starts_with("EV-Tach,"));
+    assert_eq!(board.report()["faults"], serde_json::json!([]));
+}
+
 #[test]
 fn a_stalled_endpoint_is_cleared() {
     let Some(mut board) = reading(&one_rotor(1500.0, 3000.0)) else { return };

@@ -21,11 +21,16 @@ fn a_recording_in_the_serial_flash_is_replayed() {
     board.flash(REPLAY, &stream);
     board.hold_button();
     board.break_("power_cut");
+    board.run(0.5);
+    board.break_("release");
     let read = |answer: &str| !answer.starts_with("9.91");
     let speed = board.wait_for(6.0, "FETC?", read);
     let rpm: f64 = speed.parse().expect("a number");
     assert!((rpm / 1500.0 - 1.0).abs() < 0.01, "{speed}");
     assert!(board.defmt_log().iter().any(|line| line.contains("serial flash is played")));
+    // Nor was the button taken for HOLD, which it is later.
+    let time = board.query("FETC:TIME?");
+    board.wait_for(1.0, "FETC:TIME?", |answer| *answer != time);
     // Three seconds later it has begun anew, like a camera that was plugged in again.
     board.run(3.0);
     board.wait_for(6.0, "FETC?", read);

@@ -219,7 +219,8 @@ fn overlong_lines_are_one_error_and_the_next_is_heard() {
     // The longest line that fits.
     let line = format!("{:>LINE_BYTES$}", "*OPC?");
     assert_eq!(session.ask(&line), "1\n");
-    assert_eq!(session.ask(&format!(" {line}")), "");
+    assert_eq!(session.ask(&format!("{line}\r")), "1\n", "a carriage return is none of it");
+    assert_eq!(session.ask(&format!("  {line}")), "");
     assert_eq!(session.error(), -363);
 }
 
@@ -240,6 +241,11 @@ fn a_reading_is_waited_for_and_not_longer_than_a_client_waits() {
     bench.show(reading(&[rotor(0, 1500.0)]));
     assert_eq!(drain(link, bench, 30), b";1500.0\n");
 
+    // What stood before is no next reading.
+    assert_eq!(exchange(link, bench, b"MEAS?\n", 40), b"");
+    assert_eq!(drain(link, bench, 40 + READING_TIMEOUT_US), b"9.91E+37\n");
+    assert_eq!(exchange(link, bench, b"FETC?\n", 50), b"1500.0\n");
+
     assert_eq!(exchange(link, bench, b"MEAS? B\n", 0), b"");
     bench.show(reading(&[rotor(0, 1500.0)]));
     assert_eq!(drain(link, bench, READING_TIMEOUT_US - 1), b"");
@@ -259,7 +265,22 @@ fn control_c_ends_whatever_is_under_way() {
     assert!(link.transmit(&mut [0; 10], bench) > 0);
     link.receive(b"\x03");
     assert!(link.is_idle());
+    // As when nobody fetches it.
+    link.receive(b"DATA:REC?\n");
+    link.run(0, bench);
+    assert!(link.transmit(&mut [0; 10], bench) > 0);
+    link.forget();
+    assert!(link.is_idle());
     assert_eq!(session.ask("*OPC?"), "1\n");
+}
+
+#[test]
+fn a_rotor_that_was_chosen_and_is_gone_has_a_reason() {
+    let mut session = Session::new();
+    session.bench.show(reading(&[rotor(0, 1500.0)]));
+    assert_eq!(session.ask("FETC:REAS?"), "\"\"\n");
+    session.bench.selected = Some(1);
+    assert_eq!(session.ask("FETC?;:FETC:REAS?"), "9.91E+37;\"no_rotation\"\n");
 }
 
 #[test]

@@ -33,7 +33,9 @@ const LIFTED: u8 = 1;
 
 /// Looks at button and screen for good, and does what they ask for.
 pub async fn watch(front: &SharedFront, pins: InputPins) {
-    let mut knob = Knob { pin: Input::new(pins.button, Pull::Down), since: None };
+    // Held since before the start it asked for the replay, and for nothing else.
+    let since = Some((Instant::now(), true));
+    let mut knob = Knob { pin: Input::new(pins.button, Pull::Down), since };
     let touched = Input::new(pins.touched, Pull::Up);
     let mut config = i2c::Config::default();
     config.frequency = Hertz(400_000);

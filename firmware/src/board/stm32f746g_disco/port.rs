@@ -3,7 +3,7 @@
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt as _, Priority};
-use embassy_stm32::{bind_interrupts, peripherals, usb};
+use embassy_stm32::{bind_interrupts, pac, peripherals, usb};
 use embassy_time::{Duration, with_timeout};
 use embassy_usb::class::cdc_acm::{CdcAcmClass, Receiver, Sender, State};
 use embassy_usb::{Builder, Config, UsbDevice};
@@ -72,6 +72,23 @@ pub struct Port {
     rest: core::ops::Range<usize>,
 }
 
+/// The endpoint of the data to the PC, as [`CdcAcmClass`] is given it: the second behind control, after its notifications.
+const DATA_IN: usize = 2;
+
+/// Takes back a packet that nobody fetches: it keeps the endpoint taken, over a reset of the bus as well, for whoever opens the port
+/// next (ST RM0385, "IN endpoint disable").
+fn give_up() {
+    let core = pac::USB_OTG_FS;
+    core.diepctl(DATA_IN).modify(|w| {
+        w.set_snak(true);
+        w.set_epdis(true);
+    });
+    core.grstctl().write(|w| {
+        w.set_txfflsh(true);
+        w.set_txfnum(DATA_IN as u8);
+    });
+}
+
 /// Nobody listens.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no program listens at the USB port: open it")]
@@ -113,7 +130,10 @@ impl Write for Port {
         }
         match with_timeout(PATIENCE, self.sender.write_packet(&bytes[..count])).await {
             Ok(Ok(())) => Ok(count),
-            _ => Err(NotHeard),
+            _ => {
+                give_up();
+                Err(NotHeard)
+            }
         }
     }
 

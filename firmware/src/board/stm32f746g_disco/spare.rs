@@ -48,17 +48,16 @@ impl Spare {
 
     /// Sets a pixel; whether it is on the screen.
     pub fn set(&mut self, x: usize, y: usize, colour: Rgb565) -> bool {
-        let on_screen = x < WIDTH && y < HEIGHT;
-        if on_screen {
-            self.0[y * WIDTH + x] = code(colour);
-        }
-        on_screen
+        let pixel = self.0.get_mut(y * WIDTH + x).filter(|_| x < WIDTH && y < HEIGHT);
+        pixel.map(|pixel| *pixel = code(colour)).is_some()
     }
 
     /// Sets the pixels of a row in these columns, which are on the screen.
     pub fn fill(&mut self, y: usize, columns: Range<usize>, colour: Rgb565) {
         let row = y * WIDTH;
-        self.0[row + columns.start..row + columns.end].fill(code(colour));
+        if let Some(pixels) = self.0.get_mut(row + columns.start..row + columns.end) {
+            pixels.fill(code(colour));
+        }
     }
 }
 

@@ -35,16 +35,16 @@ static MEMORY: Shared = Shared(UnsafeCell::new(Memory {
     buffers: [[0; BUFFER_BYTES]; CHANNELS],
 }));
 
-/// The buffer of a channel.
+/// The buffer of a channel; of the last, where there are fewer.
 pub fn buffer(channel: usize) -> *mut u8 {
     // SAFETY: within the array; no reference is made.
-    unsafe { (&raw mut (*MEMORY.0.get()).buffers[channel]).cast() }
+    unsafe { (&raw mut (*MEMORY.0.get()).buffers[channel.min(CHANNELS - 1)]).cast() }
 }
 
-/// The buffer of a slot.
+/// The buffer of a slot; of the last, where there are fewer.
 pub fn slot(index: usize) -> *mut u8 {
     // SAFETY: as above.
-    unsafe { (&raw mut (*MEMORY.0.get()).slots[index]).cast() }
+    unsafe { (&raw mut (*MEMORY.0.get()).slots[index.min(SLOTS - 1)]).cast() }
 }
 
 /// Address as the core wants it.

@@ -59,7 +59,7 @@ impl Ring {
         let address = memory::address(memory::slot((self.first + self.full) % SLOTS));
         // Whole packets.
         let packet_bytes = usize::from(endpoint.packet_bytes);
-        let bytes = (SLOT_BYTES / packet_bytes * packet_bytes) as u32;
+        let bytes = (SLOT_BYTES - SLOT_BYTES.checked_rem(packet_bytes)?) as u32;
         Some(Transfer { endpoint, is_in: true, pid: self.pid, address, bytes })
     }
 
@@ -85,15 +85,20 @@ impl Ring {
     pub fn waiting(&mut self) -> Waiting {
         if self.full > 0 {
             let slot = memory::slot(self.first).cast_const().wrapping_add(self.fetched);
-            return Waiting::Bytes(slot, usize::from(self.bytes[self.first]) - self.fetched);
+            return Waiting::Bytes(slot, self.first_bytes() - self.fetched);
         }
         self.error.take().map_or(Waiting::Nothing, Waiting::Error)
+    }
+
+    /// Bytes of the slot that is fetched next.
+    fn first_bytes(&self) -> usize {
+        self.bytes.get(self.first).copied().unwrap_or(0).into()
     }
 
     /// So many bytes of what waits have been fetched.
     pub fn took(&mut self, bytes: usize) {
         self.fetched += bytes;
-        if self.full > 0 && self.fetched >= usize::from(self.bytes[self.first]) {
+        if self.full > 0 && self.fetched >= self.first_bytes() {
             self.first = (self.first + 1) % SLOTS;
             self.full -= 1;
             self.fetched = 0;
