@@ -2,6 +2,7 @@
 
 pub mod angular;
 pub mod baseline;
+pub mod folding;
 pub mod initial;
 pub mod measurement;
 pub mod path;

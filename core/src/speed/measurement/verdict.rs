@@ -5,6 +5,7 @@ use super::baselines::FRACTION;
 use super::{ACCELERATION_SIGMAS, Measurement, Stated, TILTED_PARTS};
 use crate::math::{TAU, sqrt};
 use crate::reading::{Evidence, Reason, Status};
+use crate::speed::folding::look_us;
 use crate::speed::queue::stretch;
 use crate::speed::statistics::root_sum_square;
 use crate::store::Window;
@@ -74,6 +75,8 @@ const QUEUE_SIGMA: f32 = 0.5;
 const ROLL_RAD_PER_PX: f32 = 1e-3 / core::f32::consts::SQRT_2;
 /// Slower wandering of the centre than this in px/s is the measurement's own noise.
 const STILL_PX_S: f32 = 6.0;
+/// Patterns that pass more slowly are told by any sensor that tells anything: one that looks every 2.5 ms.
+const SLOW_HZ: f32 = 200.0;
 /// Window over which the mean roll rate of a tremor of 1 to 12 Hz, from which longer ones keep the less, is what it is at an instant.
 const ROLL_LASTS_S: f32 = 0.067;
 /// Each half of a window holds twice the roll of the whole, so the halves differ by the root of eight of it, half a window apart.
@@ -167,10 +170,22 @@ impl Measurement {
             self.status = Status::Refused(Reason::TooSlow);
             self.wanted_us = rough / most * window.duration_us as f32;
         }
+        if self.is_folded(window) {
+            self.status = Status::Refused(Reason::Ambiguous);
+        }
         let own = self.estimate.sigma_rad_s;
         let late = held_up * self.estimate.omega_rad_s;
         self.estimate.sigma_rad_s = sqrt(own * own + late * late + clock * clock);
         self.roll_sigma_rad_s = roll;
+    }
+
+    /// Whether the sensor looks too seldom to tell how fast the pattern passes.
+    // Not inlined: flash is short.
+    #[inline(never)]
+    fn is_folded(&self, window: &Window<'_>) -> bool {
+        let windings = self.parts.filter(|_| self.alike).map_or(self.windings, u32::from);
+        let passes_hz = windings as f32 * self.omega_rad_s.abs() / TAU;
+        passes_hz > SLOW_HZ && 2e-6 * passes_hz * look_us(window, self.disc) as f32 > 1.0
     }
 
     /// Whether the lock bears the phase out, and the rotor is where it should be between whole periods.
