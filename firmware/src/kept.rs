@@ -68,10 +68,9 @@ fn fault(code: u8) -> Option<Fault> {
 #[must_use]
 pub fn encode(kept: &KeptFault) -> [u8; KEPT_BYTES] {
     let mut block = [0; KEPT_BYTES];
-    block[..4].copy_from_slice(&MAGIC);
-    block[4] = code(kept.fault);
-    block[5] = kept.text.len() as u8;
-    block[6..6 + kept.text.len()].copy_from_slice(kept.text.as_bytes());
+    let head = MAGIC.into_iter().chain([code(kept.fault), kept.text.len() as u8]);
+    let bytes = head.chain(kept.text.bytes());
+    block.iter_mut().zip(bytes).for_each(|(at, byte)| *at = byte);
     let checksum = CRC.checksum(&block[..KEPT_BYTES - 4]);
     block[KEPT_BYTES - 4..].copy_from_slice(&checksum.to_le_bytes());
     block

@@ -86,13 +86,15 @@ impl Header {
     /// The header's bytes.
     #[must_use]
     pub fn encode(&self) -> [u8; Self::BYTES] {
-        let mut bytes = [0; Self::BYTES];
-        bytes[..8].copy_from_slice(&MAGIC);
-        bytes[8..16].copy_from_slice(&self.first_us.to_le_bytes());
-        bytes[16..18].copy_from_slice(&self.geometry.width_px.to_le_bytes());
-        bytes[18..20].copy_from_slice(&self.geometry.height_px.to_le_bytes());
-        bytes[20..].copy_from_slice(&self.events.to_le_bytes());
-        bytes
+        let [m0, m1, m2, m3, m4, m5, m6, m7] = MAGIC;
+        let [t0, t1, t2, t3, t4, t5, t6, t7] = self.first_us.to_le_bytes();
+        let [w0, w1] = self.geometry.width_px.to_le_bytes();
+        let [h0, h1] = self.geometry.height_px.to_le_bytes();
+        let [n0, n1, n2, n3] = self.events.to_le_bytes();
+        [
+            m0, m1, m2, m3, m4, m5, m6, m7, t0, t1, t2, t3, t4, t5, t6, t7, w0, w1, h0, h1, n0, n1,
+            n2, n3,
+        ]
     }
 }
 

@@ -46,20 +46,18 @@ pub enum BlockError {
 pub fn encode(preferences: &Preferences) -> [u8; BLOCK_BYTES] {
     let Preferences { unit, alarm: Alarm { low_rpm, high_rpm }, blades, clock_trim_ppm } =
         *preferences;
-    let mut block = [0; BLOCK_BYTES];
-    block[0] = GENERATION;
-    block[1] = match unit {
+    let unit = match unit {
         Unit::Rpm => 0,
         Unit::Hertz => 1,
         Unit::RadPerS => 2,
         Unit::MsPerTurn => 3,
     };
-    block[2] = blades.unwrap_or(0);
-    block[3] = low_rpm.map_or(0, |_| LOW) | high_rpm.map_or(0, |_| HIGH);
-    block[4..8].copy_from_slice(&low_rpm.unwrap_or(0.0).to_le_bytes());
-    block[8..12].copy_from_slice(&high_rpm.unwrap_or(0.0).to_le_bytes());
-    block[12..16].copy_from_slice(&clock_trim_ppm.to_le_bytes());
-    block
+    let blades = blades.unwrap_or(0);
+    let flags = low_rpm.map_or(0, |_| LOW) | high_rpm.map_or(0, |_| HIGH);
+    let [l0, l1, l2, l3] = low_rpm.unwrap_or(0.0).to_le_bytes();
+    let [h0, h1, h2, h3] = high_rpm.unwrap_or(0.0).to_le_bytes();
+    let [c0, c1, c2, c3] = clock_trim_ppm.to_le_bytes();
+    [GENERATION, unit, blades, flags, l0, l1, l2, l3, h0, h1, h2, h3, c0, c1, c2, c3]
 }
 
 /// The preferences of a block.
@@ -73,8 +71,7 @@ pub fn decode(bytes: &[u8]) -> Result<Preferences, BlockError> {
     }
     // Fields that are not there are zero, which stands for the default of each.
     let mut block = [0; BLOCK_BYTES - 1];
-    let known = fields.len().min(block.len());
-    block[..known].copy_from_slice(&fields[..known]);
+    block.iter_mut().zip(fields).for_each(|(byte, field)| *byte = *field);
     let [unit, blades, flags, l0, l1, l2, l3, h0, h1, h2, h3, c0, c1, c2, c3] = block;
     let range = |byte| BlockError::Range { byte };
     let limit = |flag, bytes, byte| {

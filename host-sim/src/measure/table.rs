@@ -48,7 +48,7 @@ fn stretch(facts: &FileFacts, readings: &[Reading], told: &RotorReading) -> Stri
     let is_it = |rotor: &RotorReading| (rotor.id, rotor.status) == (told.id, told.status);
     let mut of_it = readings.iter().filter(|reading| reading.rotors.iter().any(is_it));
     let Some(first) = of_it.next() else { return String::new() };
-    let last = of_it.last().unwrap_or(first);
+    let last = of_it.next_back().unwrap_or(first);
     let half_us = |reading: &Reading| u64::from(reading.window_us) / 2;
     let start_us = first.t_us.saturating_sub(half_us(first));
     let end_us = last.t_us.saturating_add(half_us(last));
