@@ -35,8 +35,13 @@ pub fn look_us(window: &Window<'_>, disc: Disc) -> u32 {
     let y = (disc.y_px as u16).wrapping_sub(half);
     for event in window.events() {
         let t_us = event.since(window.start_us).unsigned_abs();
-        look(&mut columns, event.x().wrapping_sub(x), t_us);
-        look(&mut rows, event.y().wrapping_sub(y), t_us);
+        let (column, row) = (event.x().wrapping_sub(x), event.y().wrapping_sub(y));
+        if usize::from(column) < LINES {
+            look(&mut columns, column, t_us);
+        }
+        if usize::from(row) < LINES {
+            look(&mut rows, row, t_us);
+        }
         look(&mut all, 0, t_us);
     }
     regular_us(&columns, window).max(regular_us(&rows, window)).max(regular_us(&all, window))

@@ -75,8 +75,8 @@ const QUEUE_SIGMA: f32 = 0.5;
 const ROLL_RAD_PER_PX: f32 = 1e-3 / core::f32::consts::SQRT_2;
 /// Slower wandering of the centre than this in px/s is the measurement's own noise.
 const STILL_PX_S: f32 = 6.0;
-/// Patterns that pass more slowly are told by any sensor that tells anything: one that looks every 2.5 ms.
-const SLOW_HZ: f32 = 200.0;
+/// Patterns that pass more slowly are told by any sensor that tells anything: one that looks every 2 ms.
+const SLOW_HZ: f32 = 250.0;
 /// Window over which the mean roll rate of a tremor of 1 to 12 Hz, from which longer ones keep the less, is what it is at an instant.
 const ROLL_LASTS_S: f32 = 0.067;
 /// Each half of a window holds twice the roll of the whole, so the halves differ by the root of eight of it, half a window apart.
