@@ -141,7 +141,7 @@ step_fuzz() {
     return
   fi
   # What runs for two seconds each need not be fast.
-  (cd fuzz && CARGO_PROFILE_RELEASE_OPT_LEVEL=1 cargo build --release)
+  (cd fuzz && CARGO_TARGET_DIR=target CARGO_PROFILE_RELEASE_OPT_LEVEL=1 cargo build --release)
   printf '%s\0' fuzz/seeds/*/ | xargs -0 -n 1 -P 2 bash -c 'set -o pipefail; fuzz_from "$1"' _
 }
 
