@@ -69,10 +69,10 @@ fn look(lines: &mut [Line], line: u16, t_us: u32) {
 fn regular_us(lines: &[Line], window: &Window<'_>) -> u32 {
     let (mut judged, mut regular, mut closest_us) = (0, 0, u32::MAX);
     for line in lines {
-        let squared = (line.looks * line.looks) as f32;
+        let looks = line.looks as f32;
         judged += u32::from(line.looks >= LEAST_LOOKS);
         if line.looks >= LEAST_LOOKS
-            && line.closest_us as f32 * squared > BEYOND_CHANCE * window.duration_us as f32
+            && line.closest_us as f32 * looks * looks > BEYOND_CHANCE * window.duration_us as f32
         {
             regular += 1;
             closest_us = closest_us.min(line.closest_us);
