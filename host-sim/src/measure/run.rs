@@ -71,6 +71,7 @@ impl Run {
             let (mut part, mut known_lost) = (Vec::new(), 0);
             let mut letters = Letters::default();
             let (mut rolls, mut wait) = (Vec::<GyroSample>::new(), Wait::default());
+            let mut rolled_us = 0;
             while !parts.is_done() {
                 let set_back_us = parts.next(&mut part);
                 chosen.leave(&mut part, &parts.timeline);
@@ -87,13 +88,15 @@ impl Run {
                     rolls.retain(|sample| parts.timeline.is_of_part(sample.t_us));
                     wait.hold(&mut part, &rolls, parts.more && set_back_us.is_none());
                 }
-                let mut ahead = &rolls[..];
+                // A recorder that writes samples before the events of their time has told some of the next part.
+                let of_part = Timeline::samples_of_part(rolled_us, &rolls);
+                let mut ahead = &rolls[..of_part];
                 let mut keep = |reading| {
                     readings.push(letters.lettered(parts.timeline.laid(reading)));
                 };
                 feed(tachometer, &part, &mut ahead, &mut keep);
-                let used = rolls.len() - ahead.len();
-                rolls.drain(..used);
+                let used = of_part - ahead.len();
+                rolled_us = rolls.drain(..used).next_back().map_or(rolled_us, |sample| sample.t_us);
                 // The device forgets a window that its clock leaves behind. What is out of order throughout will be refused.
                 let ends = set_back_us.is_some()
                     && plan.capacity == Capacity::Full
@@ -104,7 +107,7 @@ impl Run {
                 }
                 if let Some(t_us) = set_back_us {
                     parts.timeline.set_back_to(t_us);
-                    wait = Wait::default();
+                    (wait, rolled_us) = (Wait::default(), 0);
                 }
             }
             chosen.facts.thinned = tachometer.thinned();

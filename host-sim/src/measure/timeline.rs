@@ -1,6 +1,6 @@
 //! One time for a stream whose clock is set back.
 
-use evtach_core::{CLOCK_RESET_US, Event, Reading};
+use evtach_core::{CLOCK_RESET_US, Event, GyroSample, Reading};
 
 /// Lays the parts of a stream end to end: where its clock is set back, the tachometer begins anew, and what follows would seem to
 /// lie before, or within, what came.
@@ -47,6 +47,17 @@ impl Timeline {
     pub fn is_of_part(&self, t_us: u64) -> bool {
         let ahead_us = t_us.saturating_sub(self.latest_us.unwrap_or(t_us));
         !self.is_set_back() || ahead_us < CLOCK_RESET_US / 2
+    }
+
+    /// How many of the next samples of a gyro, behind one of the time `before_us`, come before their own times are set back.
+    #[must_use]
+    pub fn samples_of_part(mut before_us: u64, samples: &[GyroSample]) -> usize {
+        let goes_back = |sample: &GyroSample| {
+            let back_us = before_us.saturating_sub(sample.t_us);
+            before_us = before_us.max(sample.t_us);
+            back_us >= CLOCK_RESET_US / 2
+        };
+        samples.iter().position(goes_back).unwrap_or(samples.len())
     }
 
     /// Hands out events with their times laid end to end.
