@@ -1,8 +1,12 @@
 //! The camera's roll, from `evtach synth` by way of a file to the speed in the room.
 
+use std::collections::VecDeque;
+
 use evtach_core::{Event, Geometry, GyroSample, Polarity};
 use evtach_host::recording::write::{self, WriteFormat};
 use evtach_host::recording::{self, ImuSample, OpenOptions};
+use evtach_host::synth::scene::{Camera, Gyro};
+use evtach_host::synth::{Model, Rotor, Scene, generate};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -123,4 +127,57 @@ fn a_recording_without_gyro_samples_says_so() {
     let run = evtach(&["convert", &file, &out, "--to", "evt3"], b"");
     assert_eq!(run.code, Some(0), "{}", run.stderr);
     assert!(run.stderr.contains("inertial samples left out"), "{}", run.stderr);
+}
+
+/// A recorder writes samples with the events of their time or behind them, also where the clock is set back meanwhile.
+#[test]
+fn a_gyro_behind_a_set_back_clock_is_waited_for_as_before_it() {
+    let rotor = Rotor { radius_px: 20.0, ..Rotor::default() };
+    let gyro = Some(Gyro::default());
+    let shaken = Camera { tremor_px: 3.0, tremor_mrad: 3.0, ..Camera::default() };
+    let scene = Scene {
+        rotors: vec![rotor],
+        camera: Camera { roll_rad_s: 0.3, gyro, ..shaken },
+        model: Model::Edge,
+        duration_ms: 100.0,
+        seed: 7,
+        ..Scene::default()
+    };
+    let hand = generate(&scene).expect("a scene in range");
+    let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
+    let folder = folder();
+    let [with, behind] = [0, 30].map(|behind_ms| {
+        let file = folder.path().join("set_back.aedat4");
+        let mut writer = write::create(&file, WriteFormat::Aedat4, geometry).expect("a file");
+        // Of each millisecond, by the clock that is set back and by one that goes on.
+        let mut waiting = VecDeque::new();
+        for (ms, is_ahead) in (0..200).map(|ms| (ms, ms < 100)) {
+            let since_us = 1_000 * (ms % 100);
+            let is_now = |t_us: u64| (since_us..since_us + 1_000).contains(&t_us);
+            let clock_us = |t_us: u64| if is_ahead { t_us + 5_000_000 } else { t_us };
+            let events = hand.events.iter().filter(|event| is_now(event.t_us));
+            let event = |event: &Event| Event { t_us: clock_us(event.t_us), ..*event };
+            writer.write(&events.map(event).collect::<Vec<_>>()).expect("events that fit");
+            let samples = hand.gyro.iter().filter(|sample| is_now(sample.t_us));
+            let sample =
+                |sample: &GyroSample| GyroSample { t_us: clock_us(sample.t_us), ..*sample };
+            waiting.push_back(samples.map(|s| ImuSample::rolling(&sample(s))).collect::<Vec<_>>());
+            if waiting.len() > behind_ms {
+                writer.write_imu(&waiting.pop_front().unwrap_or_default()).expect("samples");
+            }
+        }
+        waiting.iter().for_each(|samples| writer.write_imu(samples).expect("samples"));
+        writer.finish().expect("room on the disk");
+        let file = file.display().to_string();
+        let options = ["--gyro", "--gyro-sigma", "0.003", "--window-ms", "60"];
+        let run = evtach(&[&["measure", "--json", &file], &options[..]].concat(), b"");
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        let document: Value = serde_json::from_str(&run.stdout).expect("one JSON document");
+        // The first one behind the border.
+        let readings = document["readings"].as_array().expect("a list");
+        let later = readings.iter().find(|reading| reading["t_s"].as_f64() > Some(0.1));
+        later.expect("a reading behind the border")["rotors"][0].clone()
+    });
+    assert_eq!(with["frame"], "room");
+    assert_eq!(with, behind);
 }
