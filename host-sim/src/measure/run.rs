@@ -207,3 +207,42 @@ impl<'a> Parts<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use evtach_core::{Geometry, Polarity};
+
+    use super::*;
+    use crate::recording::write::{WriteFormat, create};
+    use crate::recording::{OpenOptions, open};
+
+    #[test]
+    fn what_is_lost_outside_of_a_part_is_not_lost_of_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("damaged.spi");
+        let geometry = Geometry::new(64, 48).expect("a sensor in range");
+        let event = |t_us| Event { t_us, x: 5, y: 7, polarity: Polarity::On };
+        let mut writer = create(&path, WriteFormat::Spi, geometry).expect("a file");
+        writer.write(&(0..150_000).map(event).collect::<Vec<_>>()).expect("events that fit");
+        writer.finish().expect("room on the disk");
+        // No frame of the middle third is whole.
+        let mut bytes = std::fs::read(&path).expect("what was written");
+        let third = bytes.len() / 3;
+        bytes[third..2 * third].iter_mut().step_by(100).for_each(|byte| *byte ^= 0x55);
+        std::fs::write(&path, bytes).expect("room on the disk");
+
+        // As the file's facts and its readings tell it.
+        let lost = |since_us| {
+            let mut recording = open(&path, &OpenOptions::default()).expect("a recording");
+            let settings = Settings::new(geometry);
+            let plan = Plan { settings, capacity: Capacity::Device, takes_gyro: false, since_us };
+            let run = Run::over(String::new(), &mut recording, &plan, |_, _| ());
+            assert!(run.facts.events > 0 && !run.readings.is_empty());
+            (run.facts.lost, run.readings.iter().map(|reading| reading.lost).sum())
+        };
+        let (whole, told): (u64, u64) = lost(0..u64::MAX);
+        assert!(whole > 45_000 && told > 45_000, "{whole}, {told}");
+        assert_eq!(lost(0..20_000), (0, 0));
+        assert_eq!(lost(130_000..u64::MAX), (0, 0));
+    }
+}
