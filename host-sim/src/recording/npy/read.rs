@@ -254,4 +254,15 @@ mod tests {
         assert!(fraction.starts_with("NPY, record 0: the time is -0.25\n"), "{fraction}");
         assert_eq!(event("<i8", 500_i64.to_le_bytes()).unwrap().t_us, 500);
     }
+
+    /// Robots' recorders write them so: taken for microseconds, a rotor would turn a thousand times slower than it does.
+    #[test]
+    fn whole_times_are_nanoseconds_where_they_are_as_large_as_those_since_1970() {
+        let (ns, us) = (1_700_000_000_123_456_789_u64, 1_700_000_000_123_456);
+        for kind in ["<i8", "<u8"] {
+            assert_eq!(event(kind, ns.to_le_bytes()).unwrap().t_us, us, "{kind}");
+            // A thousand times smaller they are microseconds since then.
+            assert_eq!(event(kind, us.to_le_bytes()).unwrap().t_us, us, "{kind}");
+        }
+    }
 }
