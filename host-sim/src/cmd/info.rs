@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::Context;
-use evtach_core::Event;
+use evtach_core::{Event, Polarity};
 use evtach_host::measure;
 use evtach_host::recording::{self, ImuSample, Recording};
 
@@ -55,13 +55,14 @@ fn about(file: &Path, args: &Args, told: &mut bool) -> anyhow::Result<()> {
     let options = args.stated.into();
     let mut recording = recording::open(file, &options).with_context(|| name.clone())?;
     let mut statistics = Statistics::new(recording.geometry);
-    let (mut imu, mut timeline) = (Vec::new(), measure::Timeline::default());
+    let (mut imu, mut imu_timeline) = (Vec::new(), measure::Timeline::default());
+    let mut timeline = measure::Timeline::default();
     let mut chunk: Vec<Event> = Vec::new();
     let result = loop {
         chunk.clear();
         let more = recording.read_chunk(&mut chunk);
         timeline.lay(&chunk, |event| statistics.add(event));
-        note_imu(&mut imu, recording.take_imu());
+        note_imu(&mut imu, &mut imu_timeline, &recording.take_imu());
         match more {
             Ok(true) => {}
             Ok(false) => break Ok(()),
@@ -80,17 +81,18 @@ fn about(file: &Path, args: &Args, told: &mut bool) -> anyhow::Result<()> {
     result.with_context(|| name)
 }
 
-/// Sum over inertial samples: number, first and last time.
-fn note_imu(spans: &mut Vec<Count>, samples: Vec<ImuSample>) {
-    for sample in samples {
-        match spans.first_mut() {
-            Some(span) => {
-                span.count += 1;
-                span.last_us = span.last_us.max(sample.t_us);
-            }
-            None => spans.push(Count { count: 1, first_us: sample.t_us, last_us: sample.t_us }),
+/// Sum over inertial samples: number, first and last time. Their own times tell where the clock is set back: they need not come with the
+/// events of theirs.
+fn note_imu(spans: &mut Vec<Count>, timeline: &mut measure::Timeline, samples: &[ImuSample]) {
+    let at = |sample: &ImuSample| Event { t_us: sample.t_us, x: 0, y: 0, polarity: Polarity::On };
+    let times: Vec<Event> = samples.iter().map(at).collect();
+    timeline.lay(&times, |laid| match spans.first_mut() {
+        Some(span) => {
+            span.count += 1;
+            span.last_us = span.last_us.max(laid.t_us);
         }
-    }
+        None => spans.push(Count { count: 1, first_us: laid.t_us, last_us: laid.t_us }),
+    });
 }
 
 fn report(
