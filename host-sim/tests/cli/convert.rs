@@ -1,5 +1,8 @@
 //! `evtach convert` and `evtach info`.
 
+use evtach_core::GyroSample;
+use evtach_host::recording::ImuSample;
+
 use super::*;
 
 const SIDES: Geometry = Geometry { width_px: 200, height_px: 160 };
@@ -138,6 +141,35 @@ fn info_tells_what_a_recording_holds() {
         "gaps ",
         "periodic ",
     ] {
+        assert!(run.stdout.contains(told), "{told:?} is not in: {}", run.stdout);
+    }
+}
+
+/// By the camera's clock the first part would lie behind the second, what is between them would be a gap of seconds, and a gyro would
+/// seem twice as fast.
+#[test]
+fn info_lays_the_parts_of_a_clock_that_is_set_back_end_to_end() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let events = rotor();
+    let path = folder.path().join("set_back.aedat4");
+    let mut writer = create(&path, WriteFormat::Aedat4, SIDES).expect("a file");
+    for ahead_us in [5_000_000, 0] {
+        let ahead = events.iter().map(|event| Event { t_us: event.t_us + ahead_us, ..*event });
+        writer.write(&ahead.collect::<Vec<_>>()).expect("events that fit");
+        let sample = |ms: u64| GyroSample { t_us: 1_000 * ms + ahead_us, roll_rad_s: 0.1 };
+        let samples: Vec<_> = (0..150).map(|ms| ImuSample::rolling(&sample(ms))).collect();
+        writer.write_imu(&samples).expect("samples that fit");
+    }
+    writer.finish().expect("room on the disk");
+    let run = evtach(&["info", &path.display().to_string()], b"");
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let (first_us, last_us) = (events[0].t_us, events[events.len() - 1].t_us);
+    let from_s = (first_us + 5_000_000) as f64 * 1e-6;
+    let to_s = from_s + 2.0 * (last_us - first_us) as f64 * 1e-6;
+    let span = format!("({from_s:.6} s to {to_s:.6} s)");
+    let note = format!("note            behind event {} the clock is set back by", events.len());
+    // 300 samples in twice 149 ms.
+    for told in [&span, "gaps            none", "300 samples, 1007 a second", &note] {
         assert!(run.stdout.contains(told), "{told:?} is not in: {}", run.stdout);
     }
 }
