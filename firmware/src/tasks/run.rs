@@ -136,3 +136,132 @@ pub async fn save<R: Recording, P: Panel>(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use core::cell::Cell;
+    use core::convert::Infallible;
+    use core::future::pending;
+    use std::string::String;
+    use std::vec::Vec;
+
+    use embassy_futures::select::{Either, select};
+    use embedded_graphics::Pixel;
+    use embedded_graphics::pixelcolor::Rgb565;
+    use embedded_graphics::prelude::{DrawTarget, OriginDimensions, Size};
+    use embedded_io_async::{ErrorKind, ErrorType};
+    use evtach_core::Geometry;
+
+    use super::*;
+    use crate::scpi::{RecorderFailed, RecorderStatus};
+    use crate::test_time::block_on;
+
+    /// A board without screen and memory for recordings.
+    struct Bare;
+
+    impl Recording for Bare {
+        fn status(&self) -> RecorderStatus {
+            RecorderStatus::default()
+        }
+
+        fn start(&mut self, _: Geometry, _: u32) {}
+
+        fn stop(&mut self) {}
+
+        fn read(&mut self, _: u32, _: &mut [u8]) -> Result<(), RecorderFailed> {
+            Err(RecorderFailed)
+        }
+    }
+
+    impl OriginDimensions for Bare {
+        fn size(&self) -> Size {
+            Size::zero()
+        }
+    }
+
+    impl DrawTarget for Bare {
+        type Color = Rgb565;
+        type Error = Infallible;
+
+        fn draw_iter<I: IntoIterator<Item = Pixel<Rgb565>>>(
+            &mut self,
+            _: I,
+        ) -> Result<(), Infallible> {
+            Ok(())
+        }
+    }
+
+    impl Panel for Bare {
+        fn bytes(&self) -> &[u8] {
+            &[]
+        }
+    }
+
+    /// What a PC says, how many bytes it still fetches, and what it heard.
+    #[derive(Default)]
+    struct Pc {
+        says: Cell<&'static str>,
+        fetches: Cell<usize>,
+        heard: RefCell<Vec<u8>>,
+    }
+
+    impl ErrorType for &Pc {
+        type Error = ErrorKind;
+    }
+
+    impl Read for &Pc {
+        async fn read(&mut self, bytes: &mut [u8]) -> Result<usize, ErrorKind> {
+            let said = self.says.take();
+            if said.is_empty() {
+                pending::<()>().await;
+            }
+            bytes[..said.len()].copy_from_slice(said.as_bytes());
+            Ok(said.len())
+        }
+    }
+
+    impl Write for &Pc {
+        async fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
+            let count = bytes.len().min(self.fetches.get());
+            if count == 0 {
+                return Err(ErrorKind::NotConnected);
+            }
+            self.fetches.set(self.fetches.get() - count);
+            self.heard.borrow_mut().extend_from_slice(&bytes[..count]);
+            Ok(count)
+        }
+
+        async fn flush(&mut self) -> Result<(), ErrorKind> {
+            Ok(())
+        }
+    }
+
+    impl Pc {
+        /// What comes within a second of saying something, of which it fetches so many bytes.
+        async fn hears(&self, fetches: usize, says: &'static str) -> String {
+            self.fetches.set(fetches);
+            self.says.set(says);
+            Timer::after_secs(1).await;
+            String::from_utf8(self.heard.take()).expect("text")
+        }
+    }
+
+    #[test]
+    fn what_a_pc_that_pauses_did_not_fetch_is_not_told_when_it_comes_back() {
+        static SHARED: Shared = Shared::new();
+        let pc = Pc::default();
+        let talk = async {
+            // A block that is sent in many pieces.
+            let begun = pc.hears(100, "SYST:HELP:HEAD?\n").await;
+            assert!(begun.len() == 100 && begun.starts_with('#'), "{begun}");
+            assert_eq!(pc.hears(usize::MAX, "").await, "");
+            assert_eq!(pc.hears(usize::MAX, "*OPC?\n").await, "1\n");
+        };
+        block_on(async {
+            let front =
+                RefCell::new(Front::new(&SHARED, Preferences::default(), None, Bare, Bare, "0"));
+            let ended = select(talk, link(&front, &SHARED, &mut &pc)).await;
+            assert!(matches!(ended, Either::First(())));
+        });
+    }
+}
