@@ -6,3 +6,4 @@ mod late;
 mod properties;
 mod still;
 mod thinned;
+mod to_and_fro;

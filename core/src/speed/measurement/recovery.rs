@@ -6,6 +6,9 @@
 //! Jitter of half of its own period hides the true speed. But then the pattern keeps step with the frequency at hand with
 //! other windings, too: with none, or as many the other way. A rigid rotor's does so only as far as it is seen unevenly around.
 //!
+//! So does what goes to and fro, slowly there and fast back, as if it turned on: on its way back each place sees as many events as on
+//! its way there, in a burst that comes as often as blades would pass.
+//!
 //! A lamp that lights the blades in flashes does the same to their frequency: with its own added or taken off, the pattern keeps
 //! step, too. Where it keeps more step so, the frequency at hand is not the blades'. Of a lamp of whatever frequency, blades that pass
 //! less than three times in the window are told by the step that their pattern keeps near standstill.
@@ -47,6 +50,11 @@ const MOST_UNEVEN: f32 = 0.4;
 /// Share in step with other windings over that with the ones at hand, less what uneven sight makes, from which on it is no rigid
 /// rotor's: these reach 0.11 in random scenes, and 0.31 of a few hundred events; mistaken speeds 0.49 and more.
 const MOST_OTHER_WINDINGS: f32 = 0.35;
+/// The same of blades that are too slow for any pixel, where it tells what goes to and fro: slowly there, as a rotor does, and so fast back that
+/// half of its events come in a burst, whatever their direction. Such motion that would be told as a rotor has 0.5 and more, rotors up to 0.32.
+const MOST_TO_AND_FRO: f32 = 0.45;
+/// Periods in the window from which on a burst in each is told from the end of the window.
+const LEAST_BURSTS: f32 = 2.5;
 /// Frequency of the harmonic in Hz below which no pixel takes so long to recover. A single mark's is asked lower: where half its speed
 /// is told, nothing else speaks against that.
 const SLOWEST_HZ: f32 = 200.0;
@@ -75,8 +83,14 @@ impl Measurement {
             // How unevenly it is seen: the harmonics of where its events are, whenever they came.
             let harmonic = u32::from(self.turn) * self.windings;
             let unevenly = || self.in_step(polar, 0.0, harmonic);
-            if asked && self.windings > 1 && share - unevenly() > MOST_OTHER_WINDINGS {
-                self.refuse(Reason::TooFast);
+            let (most, reason) = if asked {
+                (MOST_OTHER_WINDINGS, Reason::TooFast)
+            } else {
+                (MOST_TO_AND_FRO, Reason::NoRotation)
+            };
+            let told = asked || periods > LEAST_BURSTS;
+            if told && self.windings > 1 && share - unevenly() > most {
+                self.refuse(reason);
             }
             return;
         }
