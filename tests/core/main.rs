@@ -1,5 +1,6 @@
 //! What must hold of the tachometer whatever it is given.
 
+mod approach;
 mod folding;
 mod hostile_events;
 mod late;

@@ -335,12 +335,14 @@ impl Measurement {
         });
         let knot = self.pose.path().at(0.0);
         let (x_px, y_px) = (self.disc.x_px + knot.x_px, self.disc.y_px + knot.y_px);
+        // The next window's middle lies about a third of this one later.
+        let grown = 1.0 + self.pose.approach().growth / 3.0;
         let guessed = matches!(self.status, Status::Refused(Reason::Ambiguous | Reason::TooSlow));
         let nothing = self.faint && guessed;
         Outcome {
             status: if nothing { Status::Refused(Reason::NoRotation) } else { self.status },
             found: Found {
-                disc: Disc { x_px, y_px, ..self.disc },
+                disc: Disc { x_px, y_px, radius_px: self.disc.radius_px * grown },
                 omega_rad_s: self.omega_rad_s,
                 // Low enough that what a hand moves in a window does not lead astray.
                 windings: if !self.alike {

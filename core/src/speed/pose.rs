@@ -10,6 +10,7 @@
 //! Blocks one symmetry period apart see the same pixels (their place on the grid, their latency), so
 //! the trend gets an offset for each place in the period: what is fixed to the pixels cancels.
 
+mod approach;
 mod blocks;
 mod divide;
 mod look;
@@ -26,6 +27,7 @@ use crate::limits::MAX_KNOTS;
 use crate::math::{TAU, larger};
 use crate::rotors::Disc;
 use crate::store::{Even, Window};
+use approach::{Approach, Growth};
 use blocks::{
     BLOCK_SHARE, Block, LEAST_SHARE, MOST_FINE_WALK, MOST_WALK, STILL_WALK_PX, WALK_PX,
     WALK_SINGLE_PX, WALK_TWO_PX, WALK_US, Walk, correct, lapsed,
@@ -71,6 +73,7 @@ pub struct Sums {
     high: Template,
     tilt: TiltSums,
     sides: Sides,
+    growth: Growth,
 }
 
 impl Sums {
@@ -82,6 +85,7 @@ impl Sums {
         high: Template::EMPTY,
         tilt: TiltSums::EMPTY,
         sides: Sides::EMPTY,
+        growth: Growth::EMPTY,
     };
 
     /// Share of the events in step with the template of the round before.
@@ -119,6 +123,8 @@ pub struct Pose {
     phases: Option<[(f32, f32, f32); BANKS]>,
     /// Where polarities are the other way round.
     inverted: Inverted,
+    /// By how many radians its edges go round for each factor of e in radius.
+    sweep: f32,
     coherence: f32,
     /// The same before the harmonic was raised.
     first_coherence: f32,
@@ -137,6 +143,7 @@ pub struct Pose {
     /// Segment of the window that is looked at next.
     segment: usize,
     slope: Option<Slope>,
+    approach: Approach,
     /// Whether the trend of what pixels told once they had settled is to come.
     trending: bool,
     lapsed: bool,
@@ -175,6 +182,7 @@ impl Pose {
             in_period: 0,
             phases: None,
             inverted: Inverted::UPRIGHT,
+            sweep: 0.0,
             coherence: 0.0,
             first_coherence: 0.0,
             overtone: 0.0,
@@ -185,6 +193,7 @@ impl Pose {
             schedule: Schedule::NEW,
             segment: 0,
             slope: None,
+            approach: Approach::NONE,
             trending: false,
             lapsed: false,
         }
@@ -223,6 +232,12 @@ impl Pose {
     pub const fn tilted(mut self, tilt: Tilt) -> Self {
         self.tilt = Some(tilt);
         self
+    }
+
+    /// How the rotor comes nearer or goes away, once all rounds are done.
+    #[must_use]
+    pub const fn approach(&self) -> Approach {
+        self.approach
     }
 
     /// How the rotor is tilted, if that was asked.
@@ -382,6 +397,7 @@ impl Pose {
         self.sift(sums);
         if last {
             self.slope = self.trend_after(0.0, sums);
+            self.approach = self.approaches(&sums.growth);
             return true;
         }
         let mut moved_px = f32::MAX;
@@ -430,6 +446,7 @@ impl Pose {
             self.first_coherence = self.coherence;
         }
         let learnt = if sharper { &sums.high } else { &sums.low };
+        self.sweep = learnt.sweep(self.sectors, self.harmonic as f32, self.sweep);
         self.phases = Some(learnt.phases(&sums.counts, self.coherence));
         let under_way = corrected && moved_rad > under_way_rad;
         if self.schedule.advance(if sharper { f32::MAX } else { moved_px }, under_way) {

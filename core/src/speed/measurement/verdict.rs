@@ -144,6 +144,12 @@ impl Measurement {
             let both = combine(Estimate { sigma_rad_s, ..self.estimate }, phase, 1.0);
             self.estimate = Estimate { sigma_rad_s: both.sigma_rad_s.max(sigma_rad_s), ..both };
         }
+        // All witnesses follow edges at a given distance from the axis.
+        let Estimate { omega_rad_s, sigma_rad_s } = self.pose.approach().speed;
+        if sigma_rad_s > 0.0 {
+            self.estimate.omega_rad_s += omega_rad_s;
+            self.estimate.sigma_rad_s = root_sum_square(self.estimate.sigma_rad_s, sigma_rad_s);
+        }
         let clock = stated.clock_sigma_ppm * 1e-6 * self.estimate.omega_rad_s;
         let roll = if self.drift_px_s > STILL_PX_S {
             ROLL_RAD_PER_PX * self.drift_px_s * roll_share(window_s)

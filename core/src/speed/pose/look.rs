@@ -5,7 +5,7 @@ use heapless::Vec;
 use super::super::path::Moving;
 use super::blocks::{self, Seen};
 use super::schedule::Phase;
-use super::template::{BANKS, RINGS};
+use super::template::{BANKS, rings};
 use super::{Pose, Sums, sides};
 use crate::math::{Turn, TurnRate, quick_sqrt};
 use crate::store::Window;
@@ -21,10 +21,12 @@ impl Pose {
         let (stride, one_of) = if by_event { (one_of, 1) } else { (1, one_of) };
         let mut disc = Moving::new(self.disc, &self.path, window);
         let rate = TurnRate::from_rad_s(self.omega_rad_s);
-        let rings = (RINGS / self.sectors as usize).max(1);
+        let rings = rings(self.sectors);
         let rings_per_px = rings as f32 / self.disc.radius_px.max(1.0);
         // Nothing is learnt in the last round.
-        let doubles = self.may_double() && self.schedule.phase() < Phase::Last;
+        let last = self.schedule.phase() == Phase::Last;
+        let doubles = self.may_double() && !last;
+        let halves_us = self.halves_us() as u32;
         // A sample of the events tells the tilt well enough.
         let tilts = self.tilt.is_some() && self.schedule.samples();
         let always_on = usize::from(window.ignores_polarity);
@@ -56,6 +58,9 @@ impl Pose {
             sums.low.add(bank, (s, c));
             if doubles {
                 sums.high.add(bank, (2.0 * s * c, c * c - s * s));
+            }
+            if last && t_us.unsigned_abs() < halves_us {
+                sums.growth.add(t_us >= 0, r2);
             }
             let Some(phases) = &self.phases else { continue };
             let (re, im, weight) = phases[bank];

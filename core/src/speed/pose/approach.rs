@@ -1,0 +1,127 @@
+//! A rotor that comes nearer, or goes away, as someone walks up to it or a hand sways along the line of sight.
+//!
+//! The picture of it grows. Where its blades are curved, whatever lies at a given distance from the axis then shows another place of
+//! their edges, farther round: it seems to turn. Rings tell the same of both, as a spiral that grows is one that turns; only how far from
+//! the axis its events lie tells them apart. So that is what the growth is measured by, and the sweep of the blades, by which it counts,
+//! by the phases of the rings beside each other ([`super::template::Template::sweep`]).
+
+use super::super::baseline::Estimate;
+use super::{MOVING_PX_S, Pose};
+use crate::math::{floor, larger, sqrt};
+
+/// Sweep in radians for each factor of e in radius below which blades are straight: what grows shows no turn of theirs.
+const STRAIGHT: f32 = 0.1;
+/// Periods in each half from which on they are alike: in fewer, what a hand moves behind a slow rotor is not.
+const LEAST_PERIODS: f32 = 3.0;
+/// Standard errors that growth stands out by.
+const GROWING_SIGMAS: f32 = 3.0;
+/// Focal length in pixels by which a hand's speed across the line of sight tells that along it: of a lens of a usual angle before a sensor of
+/// some 346 pixels.
+const FOCAL_PX: f32 = 400.0;
+/// Standard error of what growth seems to turn, as a share of it: what leaves the disc at its rim and comes into it at its hub makes growth
+/// seem less, and a sweep may differ from ring to ring.
+const APPROACH_SIGMA: f32 = 0.1;
+
+/// Variance of an event's distance, relative, as it counts here: squares of distances that are spread evenly scatter by 0.58 of their mean,
+/// distances by half as much, and an edge makes two events or more at a pixel.
+const EVENT_VARIANCE: f32 = 0.17;
+
+/// How a rotor comes nearer or goes away.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Approach {
+    /// What is to be added to the speed that its edges seem to turn with.
+    pub speed: Estimate,
+    /// By how much its radius grows in the window, over the radius.
+    pub growth: f32,
+}
+
+impl Approach {
+    /// It does not, or that shows no turn as its blades are straight.
+    pub const NONE: Self =
+        Self { speed: Estimate { omega_rad_s: 0.0, sigma_rad_s: 0.0 }, growth: 0.0 };
+}
+
+/// Squares of events' distances from the axis, in the same number of whole periods before and behind the window's middle: what differs from
+/// place to place and from blade to blade is the same in both.
+#[derive(Clone, Copy, Debug)]
+pub struct Growth {
+    /// Number and sum.
+    halves: [[f32; 2]; 2],
+}
+
+impl Growth {
+    /// No events.
+    pub const EMPTY: Self = Self { halves: [[0.0; 2]; 2] };
+
+    /// Adds an event of the half behind the middle or before it by the square of its distance in pixels.
+    pub fn add(&mut self, behind: bool, square: f32) {
+        let half = &mut self.halves[usize::from(behind)];
+        half[0] += 1.0;
+        half[1] += square;
+    }
+
+    /// Growth of the distances from one half to the other, over the distances, and its variance.
+    fn half_to_half(&self) -> (f32, f32) {
+        let [[a, before], [b, behind]] = self.halves;
+        let (a, b) = (1.0 / larger(a, 1.0), 1.0 / larger(b, 1.0));
+        let (before, behind) = (before * a, behind * b);
+        // A square grows twice as fast.
+        ((behind - before) / larger(before + behind, 1.0), EVENT_VARIANCE * (a + b))
+    }
+}
+
+impl Pose {
+    /// Length of each half in microseconds: whole periods, or 0 where there are too few.
+    // Not inlined: flash is short.
+    #[inline(never)]
+    pub(super) fn halves_us(&self) -> f32 {
+        let periods = floor(0.5 * self.window_us / self.period_us);
+        if periods < LEAST_PERIODS { 0.0 } else { periods * self.period_us }
+    }
+
+    /// How the rotor comes nearer or goes away, by what the last round saw.
+    // Not inlined: flash is short.
+    #[inline(never)]
+    pub(super) fn approaches(&self, seen: &Growth) -> Approach {
+        let apart_s = self.halves_us() * 1e-6;
+        if self.sweep.abs() < STRAIGHT || apart_s <= 0.0 {
+            return Approach::NONE;
+        }
+        let (growth, variance) = seen.half_to_half();
+        let (rate, variance) = (growth / apart_s, variance / (apart_s * apart_s));
+        let drift_px_s = self.drift_px_s();
+        let usual = if drift_px_s > MOVING_PX_S { drift_px_s / FOCAL_PX } else { 0.0 };
+        let usual = usual * usual;
+        let unusual = rate * rate / (GROWING_SIGMAS * GROWING_SIGMAS * variance);
+        // Between what is measured and none, as likely as a hand makes either.
+        let share = if unusual > 1.0 { 1.0 } else { usual / (usual + variance) };
+        let taken = share * rate;
+        // What is left counts the more, the more it stands out.
+        let error = larger(APPROACH_SIGMA * share, unusual * unusual * (1.0 - share)) * rate;
+        let sigma_rad_s = self.sweep.abs() * sqrt(share * variance + error * error);
+        let speed = Estimate { omega_rad_s: self.sweep * taken, sigma_rad_s };
+        Approach { speed, growth: taken * self.window_us * 1e-6 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn growth_is_how_much_farther_out_events_are_later() {
+        for grown in [0.0_f32, 0.02, -0.05] {
+            let mut growth = Growth::EMPTY;
+            for k in 0..2000_u16 {
+                let square = f32::from(k % 100);
+                growth.add(false, square);
+                growth.add(true, square * (1.0 + grown) * (1.0 + grown));
+            }
+            let (found, variance) = growth.half_to_half();
+            assert!((found - grown).abs() < 0.03 * grown.abs() + 1e-5, "{grown}: {found}");
+            assert!((sqrt(variance) - 0.013).abs() < 0.001, "{variance}");
+        }
+        let (none, variance) = Growth::EMPTY.half_to_half();
+        assert!(none == 0.0 && variance.is_finite() && variance > 0.0, "{variance}");
+    }
+}

@@ -1,0 +1,52 @@
+//! Curved blades that come nearer, or go away: whatever grows shows other places of their edges at a given distance from the axis, and
+//! seems to turn.
+
+use evtach_core::{Event, Geometry, Settings};
+use evtach_host::measure::{Capacity, measure_events};
+use evtach_host::synth::scene::Shape;
+use evtach_host::synth::{Rotor, Scene, generate};
+
+const RPM: f64 = 700.0;
+
+/// What is seen of a swept fan that grows so fast, as a share in a second, about its axis.
+fn fan(growth_per_s: f64) -> (Vec<Event>, Geometry) {
+    let rotor =
+        Rotor { rpm: RPM, blades: 4, shape: Shape::Swept, radius_px: 55.0, ..Rotor::default() };
+    let scene = Scene { rotors: vec![rotor], duration_ms: 320.0, seed: 11, ..Scene::default() };
+    let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
+    let axis = Rotor::default();
+    let mut events = generate(&scene).expect("a scene in range").events;
+    for event in &mut events {
+        let grown = (growth_per_s * (event.t_us as f64 * 1e-6 - 0.15)).exp();
+        let along = |px: u16, axis: f64| (axis + grown * (f64::from(px) - axis)).round() as u16;
+        (event.x, event.y) = (along(event.x, axis.x_px), along(event.y, axis.y_px));
+    }
+    (events, geometry)
+}
+
+/// How far each reading is off, relative, and its standard error. With the device's few events growth stands out later.
+fn errors(growth_per_s: f64) -> Vec<(f64, f64)> {
+    let (events, geometry) = fan(growth_per_s);
+    let (readings, _) = measure_events(&events, &[], Settings::new(geometry), Capacity::Full);
+    let speeds = readings.iter().flat_map(|reading| &reading.rotors).filter_map(|r| r.speed);
+    let of = |rpm: f32| f64::from(rpm.abs()) / RPM;
+    speeds.map(|speed| (of(speed.rpm()) - 1.0, of(speed.rpm_sigma()))).collect()
+}
+
+#[test]
+fn curved_blades_that_come_nearer_do_not_turn_faster() {
+    for growth_per_s in [-0.3, 0.3] {
+        let errors = errors(growth_per_s);
+        assert!(!errors.is_empty(), "{growth_per_s}");
+        assert!(errors.iter().all(|(off, sigma)| off.abs() < 4.0 * sigma), "{errors:?}");
+    }
+}
+
+#[test]
+fn what_does_not_come_nearer_is_as_sure_as_ever() {
+    let errors = errors(0.0);
+    assert!(errors.iter().all(|(off, sigma)| off.abs() < 4.0 * sigma), "{errors:?}");
+    // The first one is coarse.
+    let locked = errors.get(1..).unwrap_or_default();
+    assert!(!locked.is_empty() && locked.iter().all(|(_, sigma)| *sigma < 5e-5), "{errors:?}");
+}
