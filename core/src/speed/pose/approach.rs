@@ -71,12 +71,13 @@ impl Growth {
 }
 
 impl Pose {
-    /// Length of each half in microseconds: whole periods, or 0 where there are too few.
+    /// Length of each half in microseconds: whole periods, or 0 where there are too few, or blades are straight.
     // Not inlined: flash is short.
     #[inline(never)]
     pub(super) fn halves_us(&self) -> f32 {
         let periods = floor(0.5 * self.window_us / self.period_us);
-        if periods < LEAST_PERIODS { 0.0 } else { periods * self.period_us }
+        let tells = periods >= LEAST_PERIODS && self.sweep.abs() > STRAIGHT;
+        if tells { periods * self.period_us } else { 0.0 }
     }
 
     /// How the rotor comes nearer or goes away, by what the last round saw.
@@ -84,7 +85,7 @@ impl Pose {
     #[inline(never)]
     pub(super) fn approaches(&self, seen: &Growth) -> Approach {
         let apart_s = self.halves_us() * 1e-6;
-        if self.sweep.abs() < STRAIGHT || apart_s <= 0.0 {
+        if apart_s <= 0.0 {
             return Approach::NONE;
         }
         let (growth, variance) = seen.half_to_half();

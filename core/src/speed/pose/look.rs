@@ -26,7 +26,7 @@ impl Pose {
         // Nothing is learnt in the last round.
         let last = self.schedule.phase() == Phase::Last;
         let doubles = self.may_double() && !last;
-        let halves_us = self.halves_us() as u32;
+        let halves_us = if last { self.halves_us() as u32 } else { 0 };
         // A sample of the events tells the tilt well enough.
         let tilts = self.tilt.is_some() && self.schedule.samples();
         let always_on = usize::from(window.ignores_polarity);
@@ -59,7 +59,7 @@ impl Pose {
             if doubles {
                 sums.high.add(bank, (2.0 * s * c, c * c - s * s));
             }
-            if last && t_us.unsigned_abs() < halves_us {
+            if t_us.unsigned_abs() < halves_us {
                 sums.growth.add(t_us >= 0, r2);
             }
             let Some(phases) = &self.phases else { continue };
