@@ -1,10 +1,10 @@
 //! Curved blades that come nearer, or go away: whatever grows shows other places of their edges at a given distance from the axis, and
 //! seems to turn.
 
-use evtach_core::{Event, Geometry, Settings};
+use evtach_core::{Event, Geometry, Settings, Status};
 use evtach_host::measure::{Capacity, measure_events};
-use evtach_host::synth::scene::Shape;
-use evtach_host::synth::{Rotor, Scene, generate};
+use evtach_host::synth::scene::{Camera, Shape};
+use evtach_host::synth::{Model, Rotor, Scene, generate};
 
 const RPM: f64 = 700.0;
 
@@ -49,4 +49,32 @@ fn what_does_not_come_nearer_is_as_sure_as_ever() {
     // The first one is coarse.
     let locked = errors.get(1..).unwrap_or_default();
     assert!(!locked.is_empty() && locked.iter().all(|(_, sigma)| *sigma < 5e-5), "{errors:?}");
+}
+
+#[test]
+fn a_hand_that_moves_across_brings_nothing_nearer() {
+    let rpm = 226.0;
+    let rotor = Rotor { rpm, blades: 5, shape: Shape::Swept, radius_px: 31.0, ..Rotor::default() };
+    let camera = Camera { tremor_px: 2.5, tremor_mrad: 2.5, ..Camera::default() };
+    for seed in [4, 7] {
+        let scene = Scene {
+            rotors: vec![rotor.clone()],
+            camera: camera.clone(),
+            model: Model::Edge,
+            duration_ms: 720.0,
+            seed,
+            ..Scene::default()
+        };
+        let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
+        let events = generate(&scene).expect("a scene in range").events;
+        let (readings, _) = measure_events(&events, &[], Settings::new(geometry), Capacity::Full);
+        let locked: Vec<_> = readings
+            .iter()
+            .flat_map(|reading| &reading.rotors)
+            .filter(|rotor| rotor.status == Status::Locked)
+            .filter_map(|rotor| rotor.speed)
+            .map(|speed| f64::from((speed.rpm().abs() - rpm as f32) / speed.rpm_sigma()))
+            .collect();
+        assert!(!locked.is_empty() && locked.iter().all(|off| off.abs() < 4.0), "{locked:?}");
+    }
 }

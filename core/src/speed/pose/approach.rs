@@ -11,20 +11,26 @@ use crate::math::{floor, larger, sqrt};
 
 /// Sweep in radians for each factor of e in radius below which blades are straight: what grows shows no turn of theirs.
 const STRAIGHT: f32 = 0.1;
-/// Periods in each half from which on they are alike: in fewer, what a hand moves behind a slow rotor is not.
+/// Periods in each half from which on they are alike: in fewer, what a hand moves behind a slow rotor is not, and what seems to grow only
+/// widens the bar.
 const LEAST_PERIODS: f32 = 3.0;
 /// Standard errors that growth stands out by.
 const GROWING_SIGMAS: f32 = 3.0;
 /// Focal length in pixels by which a hand's speed across the line of sight tells that along it: of a lens of a usual angle before a sensor of
 /// some 346 pixels.
 const FOCAL_PX: f32 = 400.0;
+/// Standard error of the growth of what moves across the line of sight, over its way across in radii: its hub, its rim and what is behind it
+/// show edges then that blades alone do not.
+const ACROSS_SIGMA: f32 = 0.1;
+/// Most of that way in pixels that tells: a hand goes to and fro.
+const MOST_ACROSS_PX: f32 = 3.0;
 /// Standard error of what growth seems to turn, as a share of it: what leaves the disc at its rim and comes into it at its hub makes growth
 /// seem less, and a sweep may differ from ring to ring.
 const APPROACH_SIGMA: f32 = 0.1;
 
-/// Variance of an event's distance, relative, as it counts here: squares of distances that are spread evenly scatter by 0.58 of their mean,
-/// distances by half as much, and an edge makes two events or more at a pixel.
-const EVENT_VARIANCE: f32 = 0.17;
+/// Variance of an event's distance, relative: squares of distances that are spread evenly scatter by 0.58 of their mean, distances by half as
+/// much. Of rotors that do not grow, 95 % are told less than two standard errors by it, whichever events are kept.
+const EVENT_VARIANCE: f32 = 0.085;
 
 /// How a rotor comes nearer or goes away.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,29 +82,39 @@ impl Pose {
     #[inline(never)]
     pub(super) fn halves_us(&self) -> f32 {
         let periods = floor(0.5 * self.window_us / self.period_us);
-        let tells = periods >= LEAST_PERIODS && self.sweep.abs() > STRAIGHT;
-        if tells { periods * self.period_us } else { 0.0 }
+        if self.sweep.abs() > STRAIGHT { periods * self.period_us } else { 0.0 }
     }
 
     /// How the rotor comes nearer or goes away, by what the last round saw.
     // Not inlined: flash is short.
     #[inline(never)]
     pub(super) fn approaches(&self, seen: &Growth) -> Approach {
-        let apart_s = self.halves_us() * 1e-6;
-        if apart_s <= 0.0 {
+        let apart_us = self.halves_us();
+        if apart_us <= 0.0 {
             return Approach::NONE;
         }
-        let (growth, variance) = seen.half_to_half();
-        let (rate, variance) = (growth / apart_s, variance / (apart_s * apart_s));
+        let apart_s = apart_us * 1e-6;
         let drift_px_s = self.drift_px_s();
-        let usual = if drift_px_s > MOVING_PX_S { drift_px_s / FOCAL_PX } else { 0.0 };
+        let across_px_s = if drift_px_s > MOVING_PX_S { drift_px_s } else { 0.0 };
+        let usual = across_px_s / FOCAL_PX;
         let usual = usual * usual;
+        let seeming = (across_px_s * apart_s).min(MOST_ACROSS_PX) / self.disc.radius_px;
+        let (growth, variance) = seen.half_to_half();
+        let variance = variance + ACROSS_SIGMA * ACROSS_SIGMA * seeming * seeming;
+        let (rate, variance) = (growth / apart_s, variance / (apart_s * apart_s));
         let unusual = rate * rate / (GROWING_SIGMAS * GROWING_SIGMAS * variance);
         // Between what is measured and none, as likely as a hand makes either.
-        let share = if unusual > 1.0 { 1.0 } else { usual / (usual + variance) };
+        let share = if apart_us < LEAST_PERIODS * self.period_us {
+            0.0
+        } else if unusual > 1.0 {
+            1.0
+        } else {
+            usual / (usual + variance)
+        };
         let taken = share * rate;
         // What is left counts the more, the more it stands out.
-        let error = larger(APPROACH_SIGMA * share, unusual * unusual * (1.0 - share)) * rate;
+        let error =
+            larger(APPROACH_SIGMA * share, (unusual * unusual).min(1.0) * (1.0 - share)) * rate;
         let sigma_rad_s = self.sweep.abs() * sqrt(share * variance + error * error);
         let speed = Estimate { omega_rad_s: self.sweep * taken, sigma_rad_s };
         Approach { speed, growth: taken * self.window_us * 1e-6 }
@@ -120,7 +136,7 @@ mod tests {
             }
             let (found, variance) = growth.half_to_half();
             assert!((found - grown).abs() < 0.03 * grown.abs() + 1e-5, "{grown}: {found}");
-            assert!((sqrt(variance) - 0.013).abs() < 0.001, "{variance}");
+            assert!((sqrt(variance) - 0.0092).abs() < 0.001, "{variance}");
         }
         let (none, variance) = Growth::EMPTY.half_to_half();
         assert!(none == 0.0 && variance.is_finite() && variance > 0.0, "{variance}");
