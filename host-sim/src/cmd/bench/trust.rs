@@ -79,6 +79,8 @@ struct Trial {
     model: Model,
     /// Rotors in the scene.
     rotors: usize,
+    /// Events in a second.
+    events_per_s: f64,
     /// One for each capacity.
     results: Vec<Outcome>,
 }
@@ -210,6 +212,7 @@ fn measure(number: u64) -> anyhow::Result<Trial> {
         trial: number,
         model: scene.model,
         rotors: scene.rotors.len(),
+        events_per_s: made.events.len() as f64 / scene.duration_s(),
         results: results.collect(),
     })
 }

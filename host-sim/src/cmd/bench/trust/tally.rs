@@ -2,6 +2,7 @@
 
 use std::ops::RangeInclusive;
 
+use evtach_firmware::instrument::SATURATION_EV_S;
 use serde_json::{Map, Value};
 
 use super::super::drive::Capacity;
@@ -25,6 +26,9 @@ struct Tally {
     locked: usize,
     owed: usize,
     owed_refused: usize,
+    /// The same where the device would not have its camera leave out events.
+    owed_live: usize,
+    owed_live_refused: usize,
     with_sigma: usize,
     beyond_6: usize,
     last_with_sigma: usize,
@@ -49,6 +53,10 @@ impl Tally {
         self.beyond_6 += outcome.beyond_6;
         for rotor in &outcome.rotors {
             self.add_rotor(rotor, outcome);
+            if trial.events_per_s <= f64::from(SATURATION_EV_S) {
+                self.owed_live += usize::from(rotor.owed);
+                self.owed_live_refused += usize::from(rotor.owed && rotor.error.is_none());
+            }
         }
     }
 
@@ -70,7 +78,7 @@ impl Tally {
         }
     }
 
-    fn lines(&self) -> [Line; 10] {
+    fn lines(&self) -> [Line; 11] {
         let line = |key, name, count, of, asked| Line { key, name, count, of, asked };
         let turning_scenes = self.scenes - self.still_scenes;
         [
@@ -116,6 +124,13 @@ impl Tally {
                 self.owed_refused,
                 self.owed,
                 Some(("at most 3 %", 0.0..=0.03)),
+            ),
+            line(
+                "owed_live_refused",
+                "of those at 1.5 Mev/s or less",
+                self.owed_live_refused,
+                self.owed_live,
+                None,
             ),
             line("read", "rotors read", self.read, self.rotors, Some(("at least 60 %", 0.6..=1.0))),
             line("locked", "of these locked", self.locked, self.read, None),
@@ -263,12 +278,18 @@ mod tests {
             spoken(None, 0.0, true),
             spoken(None, 0.0, false),
         ];
-        let turning =
-            Trial { trial: 0, model: Model::Edge, rotors: 4, results: vec![outcome(0, rotors)] };
+        let turning = Trial {
+            trial: 0,
+            model: Model::Edge,
+            rotors: 4,
+            events_per_s: 1.5e6,
+            results: vec![outcome(0, rotors)],
+        };
         let still = Trial {
             trial: 1,
             model: Model::Threshold,
             rotors: 0,
+            events_per_s: 1e5,
             results: vec![outcome(2, Vec::new())],
         };
         let mut tally = Tally::default();
@@ -276,6 +297,7 @@ mod tests {
             tally.add(trial, &trial.results[0]);
         }
         assert_eq!((tally.read, tally.owed, tally.owed_refused), (2, 3, 1));
+        assert_eq!((tally.owed_live, tally.owed_live_refused), (3, 1));
         let last = (tally.last_within_95, tally.last_beyond_6, tally.last_with_sigma);
         assert_eq!(last, (1, 1, 2));
         assert_eq!((tally.beyond_6, tally.with_sigma), (4, 6));
@@ -284,6 +306,8 @@ mod tests {
         let short: Vec<_> = tally.lines().into_iter().filter_map(|line| line.short()).collect();
         let refused = "refused although a reading is owed: 1 of 3; asked: at most 3 %";
         assert!(short.len() == 5 && short.contains(&refused.to_owned()), "{short:?}");
+        tally.add(&Trial { events_per_s: 1.6e6, ..turning.clone() }, &turning.results[0]);
+        assert_eq!((tally.owed, tally.owed_live), (6, 3));
         assert_eq!(wrong(&turning).count(), 0);
         let named: Vec<_> = wrong(&still).collect();
         assert!(named.len() == 1 && named[0].contains("--show 1 "), "{named:?}");
