@@ -373,27 +373,8 @@ impl Pose {
             self.approach = self.approaches(&sums.growth);
             return true;
         }
-        let mut moved_px = f32::MAX;
-        if self.phases.is_some() {
-            // Between the few knots of the first rounds a hand goes far.
-            let coarse = self.schedule.phase() < Phase::Fine;
-            let most = if coarse { MOST_WALK } else { MOST_FINE_WALK };
-            let longer = (self.path.step_us() / WALK_US).max(1.0).min(most);
-            let walk = Walk {
-                step_px: if self.still { STILL_WALK_PX } else { self.walk_px * longer },
-                coherence: self.coherence,
-                harmonic: self.harmonic,
-                radius_px: self.disc.radius_px,
-                omega_rad_s: self.omega_rad_s,
-            };
-            moved_px = correct(&mut self.path, &sums.blocks, walk).unwrap_or(f32::MAX);
-            if self.schedule.samples()
-                && let Some(tilt) = &mut self.tilt
-            {
-                let share = self.coherence.max(LEAST_SHARE);
-                tilt.correct(&sums.tilt, share, self.harmonic as f32);
-            }
-        }
+        let corrected = self.phases.is_some();
+        let moved_px = if corrected { self.correct_path(sums) } else { f32::MAX };
         let at_high = sums.high.coherence(&sums.counts);
         let least = if self.is_sparse() { SPARSE_COHERENCE } else { SHARP_COHERENCE };
         let shows =
@@ -402,7 +383,6 @@ impl Pose {
         let waits = self.schedule.phase() >= Phase::All && self.phases.is_none();
         // Nor while the path still moves by more than it reaches.
         let moved_rad = moved_px * self.harmonic as f32 / self.disc.radius_px;
-        let corrected = self.phases.is_some();
         let pulled = self.inverted.any() && self.schedule.learns();
         let (most_off_rad, under_way_rad) = if pulled {
             (PULLED_OFF_RAD, PULLED_UNDER_WAY_RAD)
@@ -429,6 +409,29 @@ impl Pose {
             }
         }
         false
+    }
+
+    /// Corrects path and tilt by what a round saw. Returns by how many pixels the path moved at most: `f32::MAX` where no block tells.
+    fn correct_path(&mut self, sums: &Sums) -> f32 {
+        // Between the few knots of the first rounds a hand goes far.
+        let coarse = self.schedule.phase() < Phase::Fine;
+        let most = if coarse { MOST_WALK } else { MOST_FINE_WALK };
+        let longer = (self.path.step_us() / WALK_US).max(1.0).min(most);
+        let walk = Walk {
+            step_px: if self.still { STILL_WALK_PX } else { self.walk_px * longer },
+            coherence: self.coherence,
+            harmonic: self.harmonic,
+            radius_px: self.disc.radius_px,
+            omega_rad_s: self.omega_rad_s,
+        };
+        let moved_px = correct(&mut self.path, &sums.blocks, walk).unwrap_or(f32::MAX);
+        if self.schedule.samples()
+            && let Some(tilt) = &mut self.tilt
+        {
+            let share = self.coherence.max(LEAST_SHARE);
+            tilt.correct(&sums.tilt, share, self.harmonic as f32);
+        }
+        moved_px
     }
 
     /// Takes the trend for the answer; `false` where there is none, and a lower harmonic may give one.

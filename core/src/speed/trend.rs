@@ -141,33 +141,8 @@ impl Trend {
         }
         let squares = points.product(&rest, &rest);
         let terms = (&slopes[..degrees], &coefficients[..degrees]);
-        let mut tried = [(0.0, Self::default()); BENDS];
-        let (mut size, mut least) = (0.0, f32::INFINITY);
-        for trend in &mut tried {
-            *trend = shrunk(terms, squares, free, size);
-            least = least.min(trend.0);
-            size = (4.0 * size).max(LEAST_BEND);
-        }
-        // The mean of all, each as likely as the points make it.
-        let mut whole = 0.0;
-        let mut mean = [0.0_f32; 6];
-        for (cost, trend) in &tried {
-            // exp(-x / 2), but for what is hardly likely.
-            let likely = (0..4).fold(1.0 / (1.0 + (cost - least) / 32.0), |x, _| x * x);
-            whole += likely;
-            let Self { slope, slope_error, bend_error, bent_beside, .. } = *trend;
-            let moments = [
-                slope,
-                slope * slope,
-                slope_error * slope_error,
-                bend_error * bend_error,
-                bent_beside,
-                trend.degrees_of_freedom as f32,
-            ];
-            mean.iter_mut().zip(moments).for_each(|(mean, moment)| *mean += likely * moment);
-        }
         let [slope, square, variance, bend_variance, bent_beside, degrees_of_freedom] =
-            mean.map(|m| m / whole);
+            over_sizes(terms, squares, free);
         let weight: f32 = points.points.iter().map(|p| p.weight).sum();
         Some(Self {
             slope,
@@ -179,6 +154,36 @@ impl Trend {
             degrees_of_freedom: degrees_of_freedom as usize,
         })
     }
+}
+
+/// Slope, its square, its variance, that of the bend, what bends beside it and the degrees of freedom, over all sizes that the coefficients
+/// may have, each as likely as the points make it.
+fn over_sizes(terms: (&[f32], &[f32]), squares: f32, free: usize) -> [f32; 6] {
+    let mut tried = [(0.0, Trend::default()); BENDS];
+    let (mut size, mut least) = (0.0, f32::INFINITY);
+    for trend in &mut tried {
+        *trend = shrunk(terms, squares, free, size);
+        least = least.min(trend.0);
+        size = (4.0 * size).max(LEAST_BEND);
+    }
+    let mut whole = 0.0;
+    let mut mean = [0.0_f32; 6];
+    for (cost, trend) in &tried {
+        // exp(-x / 2), but for what is hardly likely.
+        let likely = (0..4).fold(1.0 / (1.0 + (cost - least) / 32.0), |x, _| x * x);
+        whole += likely;
+        let Trend { slope, slope_error, bend_error, bent_beside, .. } = *trend;
+        let moments = [
+            slope,
+            slope * slope,
+            slope_error * slope_error,
+            bend_error * bend_error,
+            bent_beside,
+            trend.degrees_of_freedom as f32,
+        ];
+        mean.iter_mut().zip(moments).for_each(|(mean, moment)| *mean += likely * moment);
+    }
+    mean.map(|m| m / whole)
 }
 
 /// The trend where the third coefficient's variance is `size` times that of the noise, and by how much the points speak against that:

@@ -144,12 +144,22 @@ impl Measurement {
             let both = combine(Estimate { sigma_rad_s, ..self.estimate }, phase, 1.0);
             self.estimate = Estimate { sigma_rad_s: both.sigma_rad_s.max(sigma_rad_s), ..both };
         }
-        // All witnesses follow edges at a given distance from the axis.
+        self.take_out_growth();
+        self.widen(window, stated, held_up, lock.is_some());
+    }
+
+    /// Takes the turn out that growth makes of curved blades: all witnesses follow edges at a given distance from the axis.
+    fn take_out_growth(&mut self) {
         let Estimate { omega_rad_s, sigma_rad_s } = self.pose.approach().speed;
         if sigma_rad_s > 0.0 {
             self.estimate.omega_rad_s += omega_rad_s;
             self.estimate.sigma_rad_s = root_sum_square(self.estimate.sigma_rad_s, sigma_rad_s);
         }
+    }
+
+    /// Adds what the witnesses do not know of to the error, clock, camera and readout, or refuses where that is too much.
+    fn widen(&mut self, window: &Window<'_>, stated: &Stated, held_up: f32, locks: bool) {
+        let window_s = window.duration_us as f32 * 1e-6;
         let clock = stated.clock_sigma_ppm * 1e-6 * self.estimate.omega_rad_s;
         let roll = if self.drift_px_s > STILL_PX_S {
             ROLL_RAD_PER_PX * self.drift_px_s * roll_share(window_s)
@@ -159,7 +169,7 @@ impl Measurement {
         // What a hand makes of a steady speed is no acceleration.
         let by_hand = ACCELERATION_SIGMAS * ROLL_APART * roll / window_s;
         self.alpha_rad_s2 = self.alpha_rad_s2.filter(|alpha| alpha.abs() > by_hand);
-        if roll > 0.0 && lock.is_some() {
+        if roll > 0.0 && locks {
             self.widen_astray();
         }
         match self.status {
