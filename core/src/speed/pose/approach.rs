@@ -103,19 +103,18 @@ impl Pose {
         let variance = variance + ACROSS_SIGMA * ACROSS_SIGMA * seeming * seeming;
         let (rate, variance) = (growth / apart_s, variance / (apart_s * apart_s));
         let unusual = rate * rate / (GROWING_SIGMAS * GROWING_SIGMAS * variance);
-        // Between what is measured and none, as likely as a hand makes either.
-        let share = if apart_us < LEAST_PERIODS * self.period_us {
-            0.0
+        // What stands out, or between what is measured and none, as likely as a hand makes either.
+        let told = if unusual > 1.0 { 1.0 } else { usual / (usual + variance) };
+        let few = apart_us < LEAST_PERIODS * self.period_us;
+        let (taken, error) = if few || across_px_s > 0.0 {
+            // Taken out, what a hand only seems to bring nearer would be several times what speeds are off by: it counts as error.
+            (0.0, larger(told, (unusual * unusual).min(1.0)) * rate)
         } else if unusual > 1.0 {
-            1.0
+            (rate, sqrt(variance + APPROACH_SIGMA * APPROACH_SIGMA * rate * rate))
         } else {
-            usual / (usual + variance)
+            (0.0, unusual * unusual * rate)
         };
-        let taken = share * rate;
-        // What is left counts the more, the more it stands out.
-        let error =
-            larger(APPROACH_SIGMA * share, (unusual * unusual).min(1.0) * (1.0 - share)) * rate;
-        let sigma_rad_s = self.sweep.abs() * sqrt(share * variance + error * error);
+        let sigma_rad_s = self.sweep.abs() * error.abs();
         let speed = Estimate { omega_rad_s: self.sweep * taken, sigma_rad_s };
         Approach { speed, growth: taken * self.window_us * 1e-6 }
     }
