@@ -103,16 +103,16 @@ impl Pose {
         let variance = variance + ACROSS_SIGMA * ACROSS_SIGMA * seeming * seeming;
         let (rate, variance) = (growth / apart_s, variance / (apart_s * apart_s));
         let unusual = rate * rate / (GROWING_SIGMAS * GROWING_SIGMAS * variance);
-        // What stands out, or between what is measured and none, as likely as a hand makes either.
-        let told = if unusual > 1.0 { 1.0 } else { usual / (usual + variance) };
+        let stands_out = unusual > 1.0;
         let few = apart_us < LEAST_PERIODS * self.period_us;
-        let (taken, error) = if few || across_px_s > 0.0 {
-            // Taken out, what a hand only seems to bring nearer would be several times what speeds are off by: it counts as error.
-            (0.0, larger(told, (unusual * unusual).min(1.0)) * rate)
-        } else if unusual > 1.0 {
+        let (taken, error) = if stands_out && !few && across_px_s <= 0.0 {
             (rate, sqrt(variance + APPROACH_SIGMA * APPROACH_SIGMA * rate * rate))
         } else {
-            (0.0, unusual * unusual * rate)
+            // What is not taken out counts as error: the more, the more it stands out, and as far as a hand is likely to make it. Taken out
+            // there, what only seems to come nearer would be several times what speeds are off by.
+            let likely = usual / (usual + variance);
+            let share = if stands_out { 1.0 } else { larger(likely, unusual * unusual) };
+            (0.0, share * rate)
         };
         let sigma_rad_s = self.sweep.abs() * error.abs();
         let speed = Estimate { omega_rad_s: self.sweep * taken, sigma_rad_s };
