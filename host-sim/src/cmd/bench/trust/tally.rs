@@ -152,6 +152,8 @@ struct Line {
 /// What is asked of a share, in words and in numbers.
 type Asked = Option<(&'static str, RangeInclusive<f64>)>;
 
+// A line's name says it.
+const _: () = assert!(SATURATION_EV_S == 1_500_000);
 const NONE: Asked = Some(("none", 0.0..=0.0));
 /// Scenes from which on a share tells.
 const ENOUGH_SCENES: usize = 1000;
