@@ -49,6 +49,7 @@ pub struct How {
 
 /// What was measured of a recording.
 pub struct Measured {
+    pub plan: Plan,
     pub facts: FileFacts,
     pub geometry: Geometry,
     /// What was assumed about the file, one sentence each.
@@ -108,7 +109,7 @@ impl How {
         let Run { facts, readings, .. } = run;
         let summary = summarise(&readings, &(facts.first_us..facts.last_us), self.clock_ppm);
         let (geometry, assumed) = (recording.geometry, recording.assumed);
-        Ok(Measured { facts, geometry, assumed, readings, summary })
+        Ok(Measured { plan, facts, geometry, assumed, readings, summary })
     }
 
     /// The tachometer's settings for a sensor of this size.

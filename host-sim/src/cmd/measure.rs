@@ -43,9 +43,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 /// Measures one file; whether it has a speed.
 fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
-    let Measured { facts, readings, summary, .. } = args.how.measure(file, |_, _| ())?;
+    let Measured { plan, facts, readings, summary, .. } = args.how.measure(file, |_, _| ())?;
     if args.json {
-        let document = Document::new(&facts, &summary, &readings);
+        let document = Document::new(&plan, &facts, &summary, &readings);
         say(format!("{}\n", serde_json::to_string(&document)?))?;
     } else {
         say(table(&facts, &summary, &readings))?;

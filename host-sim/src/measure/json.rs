@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use evtach_core::{Reading, RotorReading, Status};
 use serde::{Deserialize, Serialize};
 
+use super::run::Plan;
 use super::summary::Summary;
 
 /// One recording.
@@ -12,6 +13,10 @@ use super::summary::Summary;
 pub struct Document {
     /// Version of the contract.
     pub schema: u32,
+    /// Name and version of the program that wrote it.
+    pub program: &'static str,
+    /// What it was told.
+    pub settings: SettingsRow,
     /// The file as named by the caller.
     pub file: String,
     /// Name of the format.
@@ -36,6 +41,27 @@ pub struct Document {
     pub rotors: Vec<RotorRow>,
     /// The series as the device would show it.
     pub readings: Vec<ReadingRow>,
+}
+
+/// What a recording was measured with: with it and the program's version the same readings come again, to the bit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SettingsRow {
+    /// "full" or "device".
+    pub capacity: &'static str,
+    /// Blade count, where it was stated.
+    pub blades: Option<u8>,
+    /// Left, top, width and height of the part of the sensor that was looked at.
+    pub roi_px: Option<[u16; 4]>,
+    /// Length of the window, where it was stated.
+    pub window_s: Option<f64>,
+    /// From the first event to where the part that was measured begins.
+    pub start_s: f64,
+    /// And to where it ends, where that was stated.
+    pub end_s: Option<f64>,
+    /// One standard deviation of the camera clock's error.
+    pub clock_ppm: f64,
+    /// One standard deviation of the gyro's zero-rate offset, where the gyro was taken.
+    pub gyro_sigma_rad_s: Option<f64>,
 }
 
 /// One rotor of a reading.
@@ -129,6 +155,25 @@ impl FileFacts {
     }
 }
 
+impl SettingsRow {
+    /// The row of a plan.
+    #[must_use]
+    pub fn new(plan: &Plan) -> Self {
+        let Plan { settings, capacity, takes_gyro, since_us } = plan;
+        let seconds = |us: u64| us as f64 / 1e6;
+        Self {
+            capacity: capacity.as_str(),
+            blades: settings.blades,
+            roi_px: settings.roi.map(|roi| [roi.x, roi.y, roi.width_px, roi.height_px]),
+            window_s: settings.window_us.map(u64::from).map(seconds),
+            start_s: seconds(since_us.start),
+            end_s: (since_us.end < u64::MAX).then(|| seconds(since_us.end)),
+            clock_ppm: widen(settings.clock_sigma_ppm),
+            gyro_sigma_rad_s: takes_gyro.then(|| widen(settings.gyro_sigma_rad_s)),
+        }
+    }
+}
+
 impl RotorRow {
     /// The row of a rotor.
     #[must_use]
@@ -166,11 +211,13 @@ impl ReadingRow {
 }
 
 impl Document {
-    /// The document of a recording.
+    /// The document of a recording that was measured as planned.
     #[must_use]
-    pub fn new(facts: &FileFacts, summary: &Summary, readings: &[Reading]) -> Self {
+    pub fn new(plan: &Plan, facts: &FileFacts, summary: &Summary, readings: &[Reading]) -> Self {
         Self {
             schema: 1,
+            program: concat!("evtach ", env!("CARGO_PKG_VERSION")),
+            settings: SettingsRow::new(plan),
             file: facts.file.clone(),
             format: facts.format.clone(),
             width_px: facts.size_px.0,

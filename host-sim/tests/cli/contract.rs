@@ -1,5 +1,5 @@
 //! `evtach measure --json`: the names and types that other programs rely on. `"schema"` counts their versions: when
-//! a test here has to change, so has that number. `host-sim/JSON.md` tells people what they mean.
+//! a field here goes, or gets another name or type, so has that number. `host-sim/JSON.md` tells people what they mean.
 
 use evtach_core::Reason;
 use serde_json::{Map, Value};
@@ -19,17 +19,20 @@ enum Kind {
     /// A reason for no reading.
     Reason,
     List,
+    Object,
 }
 
-use Kind::{Count, List, Number, Text, Word};
+use Kind::{Count, List, Number, Object, Text, Word};
 
 const STATUS: Kind = Word(&["locked", "coarse", "refused"]);
 
 /// Name, type, and whether null may stand there.
 type Field = (&'static str, Kind, bool);
 
-const DOCUMENT: [Field; 13] = [
+const DOCUMENT: [Field; 15] = [
     ("schema", Count, false),
+    ("program", Text, false),
+    ("settings", Object, false),
     ("file", Text, false),
     ("format", Text, false),
     ("width_px", Count, false),
@@ -42,6 +45,17 @@ const DOCUMENT: [Field; 13] = [
     ("reason", Kind::Reason, true),
     ("rotors", List, false),
     ("readings", List, false),
+];
+
+const SETTINGS: [Field; 8] = [
+    ("capacity", Word(&["full", "device"]), false),
+    ("blades", Count, true),
+    ("roi_px", List, true),
+    ("window_s", Number, true),
+    ("start_s", Number, false),
+    ("end_s", Number, true),
+    ("clock_ppm", Number, false),
+    ("gyro_sigma_rad_s", Number, true),
 ];
 
 const ROTOR: [Field; 12] = [
@@ -77,6 +91,7 @@ fn is(kind: Kind, value: &Value) -> bool {
             value.as_str().is_some_and(|word| Reason::ALL.iter().any(|r| r.as_str() == word))
         }
         List => value.is_array(),
+        Object => value.is_object(),
     }
 }
 
@@ -120,6 +135,8 @@ fn check_document(line: &str) -> Map<String, Value> {
     let value: Value = serde_json::from_str(line).expect("one JSON document on each line");
     let document = check(&value, &DOCUMENT);
     assert_eq!(document["schema"], 1);
+    assert_eq!(document["program"], concat!("evtach ", env!("CARGO_PKG_VERSION")));
+    check(&document["settings"], &SETTINGS);
     check_rotors(&document);
     let readings = document["readings"].as_array().expect("checked to be a list");
     for reading in readings {
@@ -169,9 +186,12 @@ fn one_document_a_file_with_exactly_these_fields() {
 #[test]
 fn every_field_is_explained() {
     let manual = include_str!("../../JSON.md");
-    for (part, fields) in
-        [("# The file", &DOCUMENT[..]), ("# A reading", &READING), ("# A rotor", &ROTOR)]
-    {
+    for (part, fields) in [
+        ("# The file", &DOCUMENT[..]),
+        ("# The settings", &SETTINGS),
+        ("# A reading", &READING),
+        ("# A rotor", &ROTOR),
+    ] {
         let rest = manual.split_once(part).map(|(_, rest)| rest).expect("a part for each object");
         let part = rest.split_once("\n## ").map_or(rest, |(part, _)| part);
         let names: Vec<&str> = part
@@ -185,6 +205,28 @@ fn every_field_is_explained() {
         told.sort_unstable();
         assert_eq!(told, expected);
     }
+}
+
+#[test]
+fn what_was_stated_is_told() {
+    let folder = folder();
+    let file = write(&folder, "rotor.raw", &rotor()).display().to_string();
+    let settings = |args: &[&str]| {
+        let run = evtach(&[&["measure", "--json", &file], args].concat(), b"");
+        check_document(run.stdout.trim_end())["settings"].clone()
+    };
+    let unstated = serde_json::json!({
+        "capacity": "full", "blades": null, "roi_px": null, "window_s": null, "start_s": 0.0, "end_s": null, "clock_ppm": 15.0,
+        "gyro_sigma_rad_s": null,
+    });
+    assert_eq!(settings(&[]), unstated);
+    let stated = serde_json::json!({
+        "capacity": "device", "blades": 3, "roi_px": [1, 2, 190, 150], "window_s": 0.1, "start_s": 0.05, "end_s": 0.2,
+        "clock_ppm": 2.5, "gyro_sigma_rad_s": 0.003,
+    });
+    let args = "--capacity device --blades 3 --roi 1,2,190,150 --window-ms 100 --start 0.05 --end 0.2 --clock-ppm 2.5 --gyro \
+                --gyro-sigma 0.003";
+    assert_eq!(settings(&args.split_whitespace().collect::<Vec<_>>()), stated);
 }
 
 /// Where a part is measured, its readings lie where they lie in the whole.
