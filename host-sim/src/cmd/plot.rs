@@ -42,6 +42,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         events.extend(more.iter().map(|event| timeline.laid_event(event)));
     })?;
     let subject = Subject {
+        plan: &measured.plan,
         facts: &measured.facts,
         geometry: measured.geometry,
         events: &events,

@@ -1,12 +1,16 @@
 //! The JSON document of `evtach measure --json`: a contract, its version counted by `schema`.
 
 use std::borrow::Cow;
+use std::fmt;
 
 use evtach_core::{Reading, RotorReading, Status};
 use serde::{Deserialize, Serialize};
 
 use super::run::Plan;
 use super::summary::Summary;
+
+/// Name and version of this program.
+pub const PROGRAM: &str = concat!("evtach ", env!("CARGO_PKG_VERSION"));
 
 /// One recording.
 #[derive(Clone, Debug, Serialize)]
@@ -174,6 +178,16 @@ impl SettingsRow {
     }
 }
 
+impl fmt::Display for SettingsRow {
+    /// What is not null, in the names of the document.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let fields = serde_json::to_value(self).unwrap_or_default();
+        let stated = fields.as_object().into_iter().flatten().filter(|(_, value)| !value.is_null());
+        let told: Vec<_> = stated.map(|(name, value)| format!("{name} {value}")).collect();
+        f.write_str(&told.join(", "))
+    }
+}
+
 impl RotorRow {
     /// The row of a rotor.
     #[must_use]
@@ -216,7 +230,7 @@ impl Document {
     pub fn new(plan: &Plan, facts: &FileFacts, summary: &Summary, readings: &[Reading]) -> Self {
         Self {
             schema: 1,
-            program: concat!("evtach ", env!("CARGO_PKG_VERSION")),
+            program: PROGRAM,
             settings: SettingsRow::new(plan),
             file: facts.file.clone(),
             format: facts.format.clone(),

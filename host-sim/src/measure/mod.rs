@@ -20,7 +20,7 @@ use evtach_core::{
 
 use ties::Ties;
 
-pub use json::{Document, FileFacts, ReadingRow, RotorRow, SettingsRow, letter};
+pub use json::{Document, FileFacts, PROGRAM, ReadingRow, RotorRow, SettingsRow, letter};
 pub use run::{Plan, Run};
 pub use summary::{Summary, summarise};
 pub use table::{evidence, table};

@@ -8,7 +8,7 @@ use evtach_core::{Event, Frame, Geometry, Reading};
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::style::RGBColor;
 
-use crate::measure::{FileFacts, Summary, evidence, letter, table};
+use crate::measure::{FileFacts, PROGRAM, Plan, SettingsRow, Summary, evidence, letter, table};
 
 /// A drawing that failed.
 #[derive(Debug, thiserror::Error)]
@@ -31,6 +31,8 @@ impl ReportError {
 /// What a report is made from.
 #[derive(Debug)]
 pub struct Subject<'a> {
+    /// How it was measured.
+    pub plan: &'a Plan,
     /// The file.
     pub facts: &'a FileFacts,
     /// Size of the sensor.
@@ -79,6 +81,8 @@ pub fn html(subject: &Subject<'_>) -> Result<String, ReportError> {
     for assumed in subject.assumed {
         body += &format!("<p>Assumed: {}.</p>\n", escaped(assumed));
     }
+    let settings = SettingsRow::new(subject.plan).to_string();
+    body += &format!("<p>Measured by {PROGRAM}: {}.</p>\n", escaped(&settings));
     body += "<h2>Where events come from</h2>\n<p>Events per cell, lighter is more. Circles: rotors of the last reading, \
              dashed where no speed was given.</p>\n";
     body += &heat::draw(subject)?;
@@ -139,11 +143,14 @@ mod tests {
     fn report_of(scene: &Scene) -> (String, Summary) {
         let made = generate(scene).unwrap();
         let geometry = Geometry::new(scene.width_px, scene.height_px).unwrap();
-        let settings = Settings::new(geometry);
+        let settings = Settings { blades: Some(3), ..Settings::new(geometry) };
+        let plan =
+            Plan { settings, capacity: Capacity::Full, takes_gyro: false, since_us: 0..u64::MAX };
         let (readings, _) = measure_events(&made.events, &[], settings, Capacity::Full);
         let summary = summarise(&readings, &(0..150_000), 15.0);
         let facts = FileFacts { file: "a<b>.raw".to_owned(), ..FileFacts::default() };
         let subject = Subject {
+            plan: &plan,
             facts: &facts,
             geometry,
             events: &made.events,
@@ -162,6 +169,10 @@ mod tests {
         assert_eq!(page.matches("<svg").count(), 3);
         assert!(page.contains("Rotor A: phase"));
         assert!(page.contains("Rotor A: relative to the camera;"));
+        let told = format!(
+            "Measured by {PROGRAM}: blades 3, capacity \"full\", clock_ppm 15.0, start_s 0.0."
+        );
+        assert!(page.contains(&told), "{page}");
         assert!(page.contains("a&lt;b&gt;.raw") && !page.contains("a<b>"));
         assert!(page.contains("640x480 &amp; more"));
     }
