@@ -47,7 +47,7 @@ pub struct Document {
     pub readings: Vec<ReadingRow>,
 }
 
-/// What a recording was measured with: with it and the program's version the same readings come again, to the bit.
+/// What was stated of the measurement, and what stands unless stated.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SettingsRow {
     /// "full" or "device".
@@ -64,7 +64,7 @@ pub struct SettingsRow {
     pub end_s: Option<f64>,
     /// One standard deviation of the camera clock's error.
     pub clock_ppm: f64,
-    /// One standard deviation of the gyro's zero-rate offset, where the gyro was taken.
+    /// One standard deviation of the gyro's zero-rate offset, where the gyro was to be taken.
     pub gyro_sigma_rad_s: Option<f64>,
 }
 
