@@ -5,6 +5,8 @@
 //! all events of the window can be turned back to one instant; the power of the angular harmonics of what is seen
 //! then is the Fourier transform of the autocorrelation, chance taken off.
 
+use core::ops::Range;
+
 use heapless::Vec;
 use microfft::Complex32;
 
@@ -25,6 +27,14 @@ const LEAST_SCORE: f32 = 2.0;
 const MOST_CHANCE: u32 = 3_072;
 /// The largest count within this share of the best score wins: six blades also repeat like three and two.
 const CLOSE_TO_BEST: f32 = 0.85;
+/// Without polarity: a count is a rival of smaller ones when its least alike step is within this share of the best one's. The largest
+/// rival wins when it is within the second share, else the count is not known. (Of random scenes true counts have 0.95 and more, nearly
+/// all 0.98, and edges counted as blades 0.98 at most.)
+const RIVALS: f32 = 0.9;
+const NO_RIVAL: f32 = 0.98;
+/// Without polarity: least correlation of parts. Edges of a single mark, a third or about a half of a turn wide, are half as alike as
+/// parts are.
+const LEAST_ALIKE: f32 = 0.7;
 /// Largest count that is tried: beyond [`MAX_BLADES`] only to say that it is beyond.
 const MOST_PARTS: usize = 20;
 
@@ -54,47 +64,56 @@ pub fn turn_back(angular: &mut AngularSums, track: &[PolarEvent], disc: Disc, om
     }
 }
 
-/// What is left when it is turned so far. Not inlined: flash is short.
+/// Correlation at steps of a part's angle each, and a share of a step more: sum and least. Not inlined: flash is short.
 #[inline(never)]
-fn correlation(powers: &[f32], turns: f32) -> f32 {
-    let angle = (turns * 65_536.0) as u32;
-    let part = |(index, power): (usize, &f32)| {
-        power * Turn(angle.wrapping_mul(index as u32 + 1) << 16).sin_cos().1
-    };
-    powers.iter().enumerate().map(part).sum()
+fn correlation(powers: &[f32], steps: Range<usize>, share: f32, parts: usize) -> (f32, f32) {
+    let angle = 1.0 / parts as f32;
+    let (mut sum, mut least) = (0.0, f32::INFINITY);
+    for step in steps {
+        let turn = ((step as f32 + share) * angle * 65_536.0) as u32;
+        let harmonic = |(index, power): (usize, &f32)| {
+            power * Turn(turn.wrapping_mul(index as u32 + 1) << 16).sin_cos().1
+        };
+        let at_step: f32 = powers.iter().enumerate().map(harmonic).sum();
+        sum += at_step;
+        least = at_step.min(least);
+    }
+    (sum, least)
 }
 
 /// Finds the number of equal parts in what was turned back. Cost: 300 000 instructions.
 #[must_use]
 pub fn symmetry(angular: &AngularSums) -> Symmetry {
     let powers = powers(angular);
-    let at = |turns: f32| correlation(&powers, turns);
-    let zero = at(0.0);
+    let (zero, _) = correlation(&powers, 0..1, 0.0, 1);
     if zero <= 0.0 {
         return Symmetry { parts: Some(1), score: 0.0 };
     }
+    let events: u32 = angular.counts.iter().take(2 * RINGS).sum();
+    let on: u32 = angular.counts.iter().take(2 * RINGS).skip(1).step_by(2).sum();
+    let least = LEAST_SCORE / sqrt(events.min(MOST_CHANCE) as f32);
+    if on == 0 || on == events {
+        return without_polarity(&powers, zero, least);
+    }
+    let mean_peak =
+        |parts: usize| correlation(&powers, 1..parts, 0.0, parts).0 / (parts - 1).max(1) as f32;
     // Mean correlation at the multiples of the angle of symmetry, less that half-way between them.
     let comb = |parts: usize| {
-        let angle = 1.0 / parts as f32;
-        let peaks: f32 = (1..parts).map(|i| at(i as f32 * angle)).sum();
-        let valleys: f32 = (0..parts).map(|i| at((i as f32 + 0.5) * angle)).sum();
-        (peaks / (parts - 1) as f32 - valleys / parts as f32) / zero
+        let valleys = correlation(&powers, 0..parts, 0.5, parts).0;
+        (mean_peak(parts) - valleys / parts as f32) / zero
     };
     let mut scores = Vec::<f32, { MOST_PARTS + 1 }>::new();
     for parts in 0..=MOST_PARTS {
         scores.push(if parts < 2 { 0.0 } else { comb(parts) }).ok();
     }
     let best = scores.iter().copied().fold(0.0, f32::max);
-    let events: u32 = angular.counts.iter().take(2 * RINGS).sum();
-    let least = LEAST_SCORE / sqrt(events.min(MOST_CHANCE) as f32);
     let mut parts = 1;
     for (number, score) in scores.iter().enumerate().skip(2) {
         if *score >= CLOSE_TO_BEST * best {
             parts = number;
         }
     }
-    let mean_peak =
-        (1..parts).map(|i| at(i as f32 / parts as f32)).sum::<f32>() / (parts - 1).max(1) as f32;
+    let mean_peak = mean_peak(parts);
     let known = parts <= usize::from(MAX_BLADES);
     // The edges of a sharp single mark differ from what is beside them at some angles, but nothing comes again there.
     let comes_again = mean_peak >= least * zero || !known;
@@ -102,6 +121,25 @@ pub fn symmetry(angular: &AngularSums) -> Symmetry {
         return Symmetry { parts: Some(1), score: best };
     }
     Symmetry { parts: known.then_some(parts as u8), score: mean_peak / zero }
+}
+
+/// The same where all events have one polarity. Both edges of a blade look alike there, and the mean over all steps favours what edges
+/// have in common; but where a blade is not as wide as the gap beside it, they are not alike at every step.
+fn without_polarity(powers: &[f32], zero: f32, least: f32) -> Symmetry {
+    let (mut parts, mut score, mut best) = (1, 0.0, 0.0_f32);
+    for number in 2..=MOST_PARTS {
+        let least_alike = correlation(powers, 1..number, 0.0, number).1 / zero;
+        best = best.max(least_alike);
+        if least_alike >= RIVALS * best {
+            (parts, score) = (number, least_alike);
+        }
+    }
+    if best < least {
+        return Symmetry { parts: Some(1), score: best };
+    }
+    let counted = score >= NO_RIVAL * best && score >= LEAST_ALIKE;
+    let known = counted && parts <= usize::from(MAX_BLADES);
+    Symmetry { parts: known.then_some(parts as u8), score }
 }
 
 /// Power of each angular harmonic in the rotor's own frame, less what unrelated events would give.
@@ -119,12 +157,13 @@ fn powers(angular: &AngularSums) -> [f32; HARMONICS] {
 mod tests {
     use super::*;
 
-    /// Events at the edges of so many parts, ON at one edge and OFF at the other, both as sharp as can be.
-    fn edges(parts: u32, width_rad: f32) -> AngularSums {
+    /// Events at the edges of so many parts, both as sharp as can be: ON at one edge, and OFF at the other or ON as well.
+    fn edges(parts: u32, width_rad: f32, has_polarity: bool) -> AngularSums {
         let mut angular = AngularSums::EMPTY;
         for part in 0..parts {
             let first_rad = part as f32 * crate::math::TAU / parts as f32;
-            for (bank, at_rad) in [first_rad, first_rad + width_rad].into_iter().enumerate() {
+            for (edge, at_rad) in [first_rad, first_rad + width_rad].into_iter().enumerate() {
+                let bank = usize::from(!has_polarity || edge == 0);
                 angular.counts[bank] += 2_000;
                 for (k, sum) in angular.sums[bank][..HARMONICS].iter_mut().enumerate() {
                     let (sin, cos) = Turn::from_rad(at_rad).times(k as u32 + 1).sin_cos();
@@ -139,7 +178,27 @@ mod tests {
     #[test]
     fn sharp_parts_are_counted_and_a_sharp_single_mark_is_one() {
         for parts in 1..=u32::from(MAX_BLADES) {
-            let found = symmetry(&edges(parts, 0.36));
+            let found = symmetry(&edges(parts, 0.36, true));
+            assert_eq!(found.parts.map(u32::from), Some(parts), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn without_polarity_the_edges_of_broad_parts_are_not_counted_as_parts() {
+        for parts in 1..=u32::from(MAX_BLADES) {
+            for share in [0.35, 0.4, 0.43, 0.57, 0.6, 0.65] {
+                let width_rad = share * crate::math::TAU / parts as f32;
+                let found = symmetry(&edges(parts, width_rad, false)).parts.map(u32::from);
+                assert!(found.is_none_or(|found| found == parts), "{parts}, {share}: {found:?}");
+                assert!(found.is_some() || !(2..=5).contains(&parts), "{parts}, {share}");
+            }
+        }
+    }
+
+    #[test]
+    fn without_polarity_narrow_parts_are_counted() {
+        for parts in 1..=u32::from(MAX_BLADES) {
+            let found = symmetry(&edges(parts, 0.02, false));
             assert_eq!(found.parts.map(u32::from), Some(parts), "{found:?}");
         }
     }
