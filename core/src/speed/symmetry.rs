@@ -7,7 +7,6 @@
 
 use core::ops::Range;
 
-use heapless::Vec;
 use microfft::Complex32;
 
 use super::angular::AngularSums;
@@ -102,9 +101,9 @@ pub fn symmetry(angular: &AngularSums) -> Symmetry {
         let valleys = correlation(&powers, 0..parts, 0.5, parts).0;
         (mean_peak(parts) - valleys / parts as f32) / zero
     };
-    let mut scores = Vec::<f32, { MOST_PARTS + 1 }>::new();
-    for parts in 0..=MOST_PARTS {
-        scores.push(if parts < 2 { 0.0 } else { comb(parts) }).ok();
+    let mut scores = [0.0; MOST_PARTS + 1];
+    for (parts, score) in scores.iter_mut().enumerate().skip(2) {
+        *score = comb(parts);
     }
     let best = scores.iter().copied().fold(0.0, f32::max);
     let mut parts = 1;
