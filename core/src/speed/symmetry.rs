@@ -27,8 +27,8 @@ const MOST_CHANCE: u32 = 3_072;
 /// The largest count within this share of the best score wins: six blades also repeat like three and two.
 const CLOSE_TO_BEST: f32 = 0.85;
 /// Without polarity: a count is a rival of smaller ones when its least alike step is within this share of the best one's. The largest
-/// rival wins when it is within the second share, else the count is not known. (Of random scenes true counts have 0.95 and more, nearly
-/// all 0.98, and edges counted as blades 0.98 at most.)
+/// rival wins when it is within the second share, else the count is not known. (Of random scenes nearly all true counts have 0.98
+/// and more, those of few events less, and nearly all edges counted as blades less.)
 const RIVALS: f32 = 0.9;
 const NO_RIVAL: f32 = 0.98;
 /// Without polarity: least correlation of parts. Edges of a single mark, a third or about a half of a turn wide, are half as alike as

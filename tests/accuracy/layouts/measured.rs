@@ -89,8 +89,9 @@ impl Measured {
                 .hypot(f64::from(rotor.y_px) - truth.centre_px[1]);
             let size = f64::from(rotor.radius_px) / truth.radius_px;
             let blades = rotor.blades;
-            // Without polarity what may be edges as well as blades is left uncounted.
-            let uncounted = scene.sensor.all_on && blades.is_none();
+            // Without polarity what may be edges as well as blades is left uncounted where a hand blurs it.
+            let blurred = scene.sensor.all_on && scene.camera.tremor_px > 0.0;
+            let uncounted = blurred && blades.is_none();
             if off_sigmas > MOST_SIGMAS
                 || off_px > MOST_OFF_PX
                 || !SIZES.contains(&size)
