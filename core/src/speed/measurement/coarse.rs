@@ -41,11 +41,6 @@ const ALIKE_SCORE: f32 = 0.85;
 const LADDERS: usize = 3;
 /// Where there are more events than this, more segments are looked at.
 const LADDER_EVENTS: usize = 4_096;
-/// Frequency up to which a table shakes by pixels, the double of its motor's included; a winding in pixels, see `winding_px`, in which edges
-/// that shake are mistaken for the next ones; and the share of the speed told then that registration sees at most: 0.15 was seen.
-const SHAKING_HZ: f32 = 200.0;
-const SHAKEN_PX: f32 = 3.0;
-const MOST_SHAKEN: f32 = 0.5;
 /// Error of a coarse reading, relative, for one symmetry period in the window.
 const COARSE_SIGMA: f32 = 0.01;
 /// Fastest shaft, and fastest passing of blades, in revolutions a minute.
@@ -205,7 +200,7 @@ impl Measurement {
             .evidence
             .initial_rad_s
             .is_none_or(|initial| (initial - self.omega_rad_s).abs() < agreement);
-        if !agrees && (!self.sharp() || self.may_be_shaken()) {
+        if !agrees && !self.sharp() {
             return self.refuse(Reason::Ambiguous);
         }
         let periods = self.count_periods(window);
@@ -221,15 +216,5 @@ impl Measurement {
             return;
         }
         self.plan_refinement(window);
-    }
-
-    /// Whether what keeps step may be how a table shakes a slow rotor: about a centre that is a little off, edges that go to and fro look as
-    /// if the next ones came. Registration sees how little they advance.
-    fn may_be_shaken(&self) -> bool {
-        let line_rad_s = self.omega_rad_s.abs() * self.harmonic as f32;
-        let initial_rad_s = self.evidence.initial_rad_s.unwrap_or(self.omega_rad_s);
-        line_rad_s < SHAKING_HZ * TAU
-            && self.winding_px() < SHAKEN_PX
-            && initial_rad_s.abs() < MOST_SHAKEN * self.omega_rad_s.abs()
     }
 }

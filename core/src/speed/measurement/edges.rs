@@ -3,6 +3,7 @@
 
 use super::Measurement;
 use super::doubt::SMALL_PX;
+use crate::math::TAU;
 
 /// A rotor keeps at least this share of its events in step, if they have no jitter.
 const LEAST_COHERENCE: f32 = 0.2;
@@ -16,11 +17,16 @@ const LEAST_BLUR: (f32, f32) = (0.06, 1.3);
 /// Blur, noise and all, beyond which they are none where another harmonic keeps step.
 const MOST_RIVALLED_BLUR: (f32, f32) = (0.11, 1.65);
 /// The same in windings, of what could not be counted and is in doubt: of wheels of nine to sixteen parts in a hand, small ones, wrong
-/// harmonics had 0.49 to 0.9, nearly all more than 0.55.
+/// harmonics had 0.49 to 0.9, nearly all more than 0.55. The same of what may be how a table shakes, which had 0.59 or more.
 const MOST_UNCOUNTED_BLUR: f32 = 0.5;
 /// The same below which parts that were counted and have an overtone have edges, however large a share of the radius that is: 0.1 of it
 /// is this for four blades, and half of this for two.
 const CLEAR_BLUR: f32 = 0.4;
+/// Frequencies by which a table shakes by a pixel, or a few times its motor's, and a winding in pixels, see `winding_px`, in which edges that
+/// shake are mistaken for the next ones.
+const LEAST_SHAKING_HZ: f32 = 30.0;
+const MOST_SHAKING_HZ: f32 = 600.0;
+const SHAKEN_PX: f32 = 3.0;
 /// Standard deviation of the events' times in dim light, and in bright light.
 const MOST_JITTER_S: f32 = 200e-6;
 const LEAST_JITTER_S: f32 = 40e-6;
@@ -73,7 +79,7 @@ impl Measurement {
     /// may be a winding more than there are blades: only sharp ones tell. Few blades have edges all the same that a share of the radius
     /// calls blurred.
     pub(super) fn has_edges(&self, ignores_polarity: bool) -> bool {
-        if self.in_doubt() {
+        if self.in_doubt() || self.may_be_shaken() {
             return false;
         }
         let radius_px = self.disc.radius_px;
@@ -92,6 +98,17 @@ impl Measurement {
         self.too_fast_for_edges()
             || self.is_clear(ignores_polarity)
             || self.edges_px() < self.blur_px(MOST_BLUR, MOST_JITTER_S) && sharp
+    }
+
+    /// Whether what keeps step may be how a table shakes a slow rotor: about a centre that is a little off, edges that go to and fro look as
+    /// if the next ones came, and another harmonic shows as well. They are blurred by half the way to the next or more, which so close
+    /// together is sharp in pixels all the same.
+    fn may_be_shaken(&self) -> bool {
+        let line_hz = self.omega_rad_s.abs() * self.harmonic as f32 / TAU;
+        (LEAST_SHAKING_HZ..MOST_SHAKING_HZ).contains(&line_hz)
+            && self.winding_px() < SHAKEN_PX
+            && self.doubted()
+            && !self.has_overtone_within(MOST_UNCOUNTED_BLUR)
     }
 
     /// Whether so many events keep step as do at this speed, which was asked before, and no more is to be seen.
