@@ -279,7 +279,9 @@ impl Measurement {
             let parts = if self.alike { u32::from(self.parts.unwrap_or(1)).max(1) } else { 1 };
             let pose =
                 Pose::new(self.disc, self.omega_rad_s, parts, self.harmonic, window.duration_us);
-            let pose = if self.alike { pose } else { pose.unlike(self.parts.unwrap_or(1)) };
+            // Where parts were not counted they are no more than blades that keep step.
+            let unlike = self.parts.map_or(self.windings, u32::from);
+            let pose = if self.alike { pose } else { pose.unlike(unlike) };
             let tells = self.parts.is_some_and(|parts| parts >= TILTED_PARTS) && !self.doubted();
             let known = self.follows && (self.tilt.is_some() || !tells);
             let pose = if tells { pose.tilted(self.tilt.unwrap_or_default()) } else { pose };

@@ -216,9 +216,9 @@ impl Pose {
 
     /// The same for a rotor of so many parts that differ: each has its own template, on fewer rings.
     #[must_use]
-    pub const fn unlike(mut self, parts: u8) -> Self {
+    pub const fn unlike(mut self, parts: u32) -> Self {
         if parts > 1 {
-            self.sectors = parts as u32;
+            self.sectors = parts;
         }
         // Of two that differ, one may be none: then there is a single mark.
         if parts > 2 {

@@ -33,7 +33,7 @@ const RIVALS: f32 = 0.9;
 const NO_RIVAL: f32 = 0.98;
 /// Without polarity: least correlation of parts. Edges of a single mark, a third or about a half of a turn wide, are half as alike as
 /// parts are.
-const LEAST_ALIKE: f32 = 0.7;
+pub(super) const LEAST_ALIKE: f32 = 0.7;
 /// Largest count that is tried: beyond [`MAX_BLADES`] only to say that it is beyond.
 const MOST_PARTS: usize = 20;
 

@@ -338,6 +338,22 @@ fn without_polarity() {
     all_read("all ON", &Scene { sensor, ..scene(75, rotors) });
 }
 
+/// One blade half as wide as the other: nothing tells that they are two, but each shows sharply what turns.
+#[test]
+fn without_polarity_two_that_differ() {
+    let sensor = Sensor { all_on: true, ..Sensor::default() };
+    for (seed, shape) in [(71, Shape::Straight), (72, Shape::Tapered), (73, Shape::Swept)] {
+        let rotor = Rotor { blades: 2, odd_width: 0.55, shape, ..at(173.0, 130.0, 30.0, -1450.0) };
+        let name = format!("two that differ, all ON, {shape:?}");
+        for capacity in Capacity::ALL {
+            let scene = Scene { sensor: sensor.clone(), ..scene(seed, vec![rotor.clone()]) };
+            let measured = run(&scene, capacity);
+            let wrong = measured.wrong_speeds(&name, true);
+            assert!(wrong.is_empty(), "{} memory\n{}", capacity.as_str(), wrong.join("\n"));
+        }
+    }
+}
+
 /// Both edges of a blade as wide as its gap cancel in its harmonic, and a hand blurs what is left of it.
 #[test]
 fn without_polarity_in_the_hand() {

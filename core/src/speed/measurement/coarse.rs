@@ -13,7 +13,7 @@ use crate::speed::initial::{Ladder, median};
 use crate::speed::path::Path;
 use crate::speed::phase::{newton, scan};
 use crate::speed::polar::{PolarEvent, PolarTrack};
-use crate::speed::symmetry::{symmetry, turn_back};
+use crate::speed::symmetry::{LEAST_ALIKE, symmetry, turn_back};
 use crate::store::{WINDOW_SEGMENTS, Window};
 
 /// Steps of centre and speed by the polar phase.
@@ -144,8 +144,9 @@ impl Measurement {
         }
         let symmetry = symmetry(angular);
         self.parts = stated.blades.or(symmetry.parts);
-        self.alike =
-            self.parts == Some(1) || stated.blades.is_none() && symmetry.score >= ALIKE_SCORE;
+        // What was not counted is many parts, unless they are as little alike as the edges of one.
+        let least = if self.parts.is_some() { ALIKE_SCORE } else { LEAST_ALIKE };
+        self.alike = self.parts == Some(1) || stated.blades.is_none() && symmetry.score >= least;
         self.evidence.symmetry_score = Some(symmetry.score);
         self.stage = Stage::Overtone;
     }

@@ -2,7 +2,7 @@
 
 use super::super::baseline::Estimate;
 use super::baselines::FRACTION;
-use super::{ACCELERATION_SIGMAS, Measurement, Stated, TILTED_PARTS};
+use super::{ACCELERATION_SIGMAS, Measurement, Stated};
 use crate::math::{TAU, sqrt};
 use crate::reading::{Evidence, Reason, Status};
 use crate::speed::folding::look_us;
@@ -286,9 +286,9 @@ impl Measurement {
         Estimate { sigma_rad_s: root_sum_square(lock.sigma_rad_s, bias), ..lock }
     }
 
-    /// Whether it may be a single mark: two parts that differ may be one.
+    /// Whether it may be a single mark: two parts that differ may be one, and so may what could not be counted.
     fn may_be_mark(&self) -> bool {
-        self.parts == Some(1) || self.parts == Some(2) && !self.alike
+        self.parts == Some(1) || !self.alike && self.parts.is_none_or(|parts| parts == 2)
     }
 
     /// From a hand, both witnesses of a mark's lock go along a path that takes part of the hand's motion for the mark's turn. The refinement
@@ -322,7 +322,7 @@ impl Measurement {
     /// what the camera may turn by.
     fn widen_coarse(&mut self, window: &Window<'_>, stretch: f32, roll_rad_s: f32) {
         self.widen_mark(SHAKE_PX);
-        if self.parts.is_some_and(|parts| parts < TILTED_PARTS) {
+        if self.may_be_mark() || self.parts == Some(2) {
             // It may be tilted: then it seems to turn unevenly, and parts of a turn tell another speed than whole ones.
             let swing_rad_s = UNEVEN_SHARE * self.evidence.swing_rad_s.unwrap_or(0.0);
             self.estimate.sigma_rad_s = root_sum_square(self.estimate.sigma_rad_s, swing_rad_s);
