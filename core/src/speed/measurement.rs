@@ -279,7 +279,7 @@ impl Measurement {
             let parts = if self.alike { u32::from(self.parts.unwrap_or(1)).max(1) } else { 1 };
             let pose =
                 Pose::new(self.disc, self.omega_rad_s, parts, self.harmonic, window.duration_us);
-            // Where parts were not counted they are no more than blades that keep step.
+            // Where parts were not counted, each winding of what keeps step may be one.
             let unlike = self.parts.map_or(self.windings, u32::from);
             let pose = if self.alike { pose } else { pose.unlike(unlike) };
             let tells = self.parts.is_some_and(|parts| parts >= TILTED_PARTS) && !self.doubted();
