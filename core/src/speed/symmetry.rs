@@ -31,8 +31,8 @@ const CLOSE_TO_BEST: f32 = 0.85;
 /// and more, those of few events less, and nearly all edges counted as blades less.)
 const RIVALS: f32 = 0.9;
 const NO_RIVAL: f32 = 0.98;
-/// Without polarity: least correlation of parts. Edges of a single mark, a third or about a half of a turn wide, are half as alike as
-/// parts are.
+/// Least correlation of parts without polarity, and of what was not counted, below which it may be a single mark: its edges, a third or about
+/// a half of a turn wide, are half as alike as parts are.
 pub(super) const LEAST_ALIKE: f32 = 0.7;
 /// Largest count that is tried: beyond [`MAX_BLADES`] only to say that it is beyond.
 const MOST_PARTS: usize = 20;
