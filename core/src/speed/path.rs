@@ -4,6 +4,7 @@ use heapless::Vec;
 
 use super::polar::Annulus;
 use crate::limits::MAX_KNOTS;
+use crate::math::sqrt;
 use crate::rotors::Disc;
 use crate::store::{StoredEvent, Window};
 
@@ -79,6 +80,19 @@ impl Path {
             knot.y_px -= y_px;
         }
         (x_px, y_px)
+    }
+
+    /// How far its mean place in the second half is from that in the first, in pixels.
+    #[must_use]
+    pub fn half_to_half_px(&self) -> f32 {
+        let half = self.knots.len() / 2;
+        let (mut x_px, mut y_px) = (0.0, 0.0);
+        // Of an odd number, the one in the middle counts in neither.
+        for (before, behind) in self.knots.iter().zip(self.knots.iter().rev()).take(half) {
+            x_px += behind.x_px - before.x_px;
+            y_px += behind.y_px - before.y_px;
+        }
+        sqrt(x_px * x_px + y_px * y_px) / (half as f32).max(1.0)
     }
 
     /// The knots.

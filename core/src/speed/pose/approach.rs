@@ -98,7 +98,9 @@ impl Pose {
         let across_px_s = if drift_px_s > MOVING_PX_S { drift_px_s } else { 0.0 };
         let usual = across_px_s / FOCAL_PX;
         let usual = usual * usual;
-        let seeming = (across_px_s * apart_s).min(MOST_ACROSS_PX) / self.disc.radius_px;
+        // What drifts too slowly to be called moving shows another background in one half than in the other all the same.
+        let across_px = larger(across_px_s * apart_s, self.path.half_to_half_px());
+        let seeming = across_px.min(MOST_ACROSS_PX) / self.disc.radius_px;
         let (growth, variance) = seen.half_to_half();
         let variance = variance + ACROSS_SIGMA * ACROSS_SIGMA * seeming * seeming;
         let (rate, variance) = (growth / apart_s, variance / (apart_s * apart_s));
