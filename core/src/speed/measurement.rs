@@ -199,7 +199,7 @@ impl Measurement {
             Stage::Scan => self.scan(polar, angular),
             Stage::Doubt => self.doubt(window, polar, angular, even),
             Stage::Symmetry => self.symmetry(stated, polar, angular),
-            Stage::Overtone => self.overtone(polar),
+            Stage::Overtone => self.overtone(polar, angular),
             Stage::Recovery => self.recovery(window, polar),
             Stage::Pose => self.pose(window, sums, walked, even),
             Stage::Initial => self.initial(window, icp),
@@ -350,7 +350,7 @@ impl Measurement {
                 windings: if !self.alike {
                     self.harmonic
                 } else if self.moves() {
-                    self.parts.map_or(self.harmonic, u32::from)
+                    self.parts.filter(|parts| *parts > 1).map_or(self.harmonic, u32::from)
                 } else {
                     self.harmonic.max(self.pose.harmonic() / 4)
                 },

@@ -34,6 +34,9 @@ const NO_RIVAL: f32 = 0.98;
 /// Least correlation of parts without polarity, and of what was not counted, below which it may be a single mark: its edges, a third or about
 /// a half of a turn wide, are half as alike as parts are.
 pub(super) const LEAST_ALIKE: f32 = 0.7;
+/// Power at a higher harmonic over that at the first from which on it shows a single mark, and how many are asked.
+const LEAST_OF_FIRST: f32 = 0.25;
+const MARK_HARMONICS: usize = 8;
 /// Largest count that is tried: beyond [`MAX_BLADES`] only to say that it is beyond.
 const MOST_PARTS: usize = 20;
 
@@ -78,6 +81,17 @@ fn correlation(powers: &[f32], steps: Range<usize>, share: f32, parts: usize) ->
         least = at_step.min(least);
     }
     (sum, least)
+}
+
+/// Harmonic that shows a single mark best, where the second hardly shows it: without polarity both edges of a mark are alike, and those
+/// of one that is a quarter of a turn wide, say, cancel in the second. `None` where no higher one shows it, either.
+#[must_use]
+pub fn mark_harmonic(angular: &AngularSums) -> Option<u32> {
+    let powers = powers(angular);
+    let least = LEAST_OF_FIRST * powers[0];
+    let higher = powers.iter().copied().enumerate().take(MARK_HARMONICS).skip(2);
+    let (index, power) = higher.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    (powers[1] < least && power > least).then_some(index as u32 + 1)
 }
 
 /// Finds the number of equal parts in what was turned back. Cost: 300 000 instructions.

@@ -13,7 +13,7 @@ use crate::speed::initial::{Ladder, median};
 use crate::speed::path::Path;
 use crate::speed::phase::{newton, scan};
 use crate::speed::polar::{PolarEvent, PolarTrack};
-use crate::speed::symmetry::{LEAST_ALIKE, symmetry, turn_back};
+use crate::speed::symmetry::{LEAST_ALIKE, mark_harmonic, symmetry, turn_back};
 use crate::store::{WINDOW_SEGMENTS, Window};
 
 /// Steps of centre and speed by the polar phase.
@@ -152,14 +152,18 @@ impl Measurement {
     }
 
     /// Whether the line is an overtone of the blades' own.
-    pub(super) fn overtone(&mut self, polar: &[PolarEvent]) {
-        let at = |harmonic| self.in_step(polar, self.omega_rad_s, harmonic);
-        let mut share = at(self.harmonic);
+    pub(super) fn overtone(&mut self, polar: &[PolarEvent], angular: &AngularSums) {
+        let omega_rad_s = self.omega_rad_s;
+        let mut share = self.in_step(polar, omega_rad_s, self.harmonic);
         if let Some(parts) = self.parts.map(u32::from).filter(|parts| *parts > 0) {
-            let of_parts = at(parts);
+            let of_parts = self.in_step(polar, omega_rad_s, parts);
             if of_parts > share {
                 (self.harmonic, share) = (parts, of_parts);
             }
+        }
+        if let Some(harmonic) = mark_harmonic(angular).filter(|_| self.parts == Some(1)) {
+            self.harmonic = harmonic;
+            share = self.in_step(polar, omega_rad_s, harmonic);
         }
         self.evidence.coherence = Some(share);
         let rpm = self.omega_rad_s.abs() * Speed::RPM_PER_RAD_S;
