@@ -72,9 +72,7 @@ impl Path {
     // Not inlined: flash is short.
     #[inline(never)]
     pub fn centre(&mut self) -> (f32, f32) {
-        let n = (self.knots.len() as f32).max(1.0);
-        let sum = |part: fn(&Knot) -> f32| self.knots.iter().map(part).sum::<f32>() / n;
-        let (x_px, y_px) = (sum(|knot| knot.x_px), sum(|knot| knot.y_px));
+        let (x_px, y_px) = mean_place(&self.knots);
         for knot in &mut self.knots {
             knot.x_px -= x_px;
             knot.y_px -= y_px;
@@ -85,14 +83,10 @@ impl Path {
     /// How far its mean place in the second half is from that in the first, in pixels.
     #[must_use]
     pub fn half_to_half_px(&self) -> f32 {
-        let half = self.knots.len() / 2;
-        let (mut x_px, mut y_px) = (0.0, 0.0);
-        // Of an odd number, the one in the middle counts in neither.
-        for (before, behind) in self.knots.iter().zip(self.knots.iter().rev()).take(half) {
-            x_px += behind.x_px - before.x_px;
-            y_px += behind.y_px - before.y_px;
-        }
-        sqrt(x_px * x_px + y_px * y_px) / (half as f32).max(1.0)
+        let (before, behind) = self.knots.split_at(self.knots.len() / 2);
+        let ((x, y), (to_x, to_y)) = (mean_place(before), mean_place(behind));
+        let (x_px, y_px) = (to_x - x, to_y - y);
+        sqrt(x_px * x_px + y_px * y_px)
     }
 
     /// The knots.
@@ -144,6 +138,15 @@ impl Path {
         };
         Stretch { index, start: *a, way }
     }
+}
+
+/// Mean place of some knots.
+// Not inlined: flash is short.
+#[inline(never)]
+pub fn mean_place(knots: &[Knot]) -> (f32, f32) {
+    let n = (knots.len() as f32).max(1.0);
+    let sum = |part: fn(&Knot) -> f32| knots.iter().map(part).sum::<f32>() / n;
+    (sum(|knot| knot.x_px), sum(|knot| knot.y_px))
 }
 
 /// The straight way through a block.

@@ -3,7 +3,7 @@
 use heapless::Vec;
 
 use super::super::baseline::Estimate;
-use super::super::path::Knot;
+use super::super::path::mean_place;
 use super::super::statistics::{root_sum_square, student_over_normal};
 use super::super::trend::{Point, Trend};
 use super::{LEAST_SHARE, MOVING_PX_S, Pose, Sums, WALK_SINGLE_PX};
@@ -160,11 +160,15 @@ impl Pose {
         }
         // Blocks a period apart see the same pixels, unless the axis wanders: what tells more exactly.
         let folded = periods >= FOLDED_PERIODS && self.in_period > 1;
-        let trend = [1, self.in_period]
-            .into_iter()
-            .take(1 + usize::from(folded))
-            .filter_map(|fold| Trend::fit(&points, fold))
-            .min_by(|a, b| a.slope_error.total_cmp(&b.slope_error))?;
+        let untold = middle_us / half_us + self.ends_untold(&points, half_us);
+        let mut trend = Trend::fit(&points, 1);
+        if folded {
+            // The last one sees a part of its place, or some of the next: where two blades are tilted, another turn.
+            points.pop();
+            let better = |folded: &Trend| trend.is_none_or(|t| folded.slope_error < t.slope_error);
+            trend = Trend::fit(&points, self.in_period).filter(better).or(trend);
+        }
+        let trend = trend?;
         let factor = student_over_normal(trend.degrees_of_freedom);
         let (half_s, middle_s) = (half_us * 1e-6, middle_us * 1e-6);
         let alpha_rad_s2 = trend.bend / (half_s * half_s);
@@ -174,7 +178,6 @@ impl Pose {
         // What is left out may have had another acceleration, and a swing, as may the ends where no block is in step.
         let error =
             root_sum_square(factor * trend.slope_error / half_s, alpha_sigma_rad_s2 * middle_s);
-        let untold = middle_us / half_us + self.ends_untold(&points, half_us);
         let swung = END_SWING * swing_rad_s(trend.bent_beside) * untold;
         Some(Slope {
             speed: Estimate {
@@ -213,14 +216,9 @@ impl Pose {
     pub(super) fn drift_px_s(&self) -> f32 {
         let size = self.path.blocks().div_ceil(DRIFT_BLOCKS).max(1);
         let dt_s = size as f32 * self.path.step_us() * 1e-6;
-        let mean = |knots: &[Knot]| {
-            let n = knots.len() as f32;
-            let sum = |part: fn(&Knot) -> f32| knots.iter().map(part).sum::<f32>() / n;
-            (sum(|knot| knot.x_px), sum(|knot| knot.y_px))
-        };
         let (mut squares, mut count, mut before) = (0.0, 0_u8, None);
         for knots in self.path.knots().chunks_exact(size) {
-            let here = mean(knots);
+            let here = mean_place(knots);
             if let Some((x, y)) = before {
                 let (vx, vy) = ((here.0 - x) / dt_s, (here.1 - y) / dt_s);
                 squares += vx * vx + vy * vy;
