@@ -156,6 +156,8 @@ fn without_polarity(powers: &[f32], zero: f32, least: f32) -> Symmetry {
 }
 
 /// Power of each angular harmonic in the rotor's own frame, less what unrelated events would give.
+// Not inlined: flash is short.
+#[inline(never)]
 fn powers(angular: &AngularSums) -> [f32; HARMONICS] {
     let mut powers = [0.0; HARMONICS];
     for (bank, count) in angular.sums.iter().zip(angular.counts).take(2 * RINGS) {
