@@ -26,7 +26,7 @@ const LAST_STEP_PX: f32 = 0.1;
 const MOST_STANDING: f32 = 0.8;
 /// The same of the rival of what is seen all around: one that shows on half of its way only has 0.64. In random scenes rotors have 0.6 at
 /// most, and 0.79 with their axis in a corner of the picture; with that in view by a share of their radius, 0.51.
-const MOST_RIVAL: f32 = 0.7;
+const RIVAL_OF_ARC: f32 = 0.7;
 const AXIS_IN_VIEW: f32 = 0.3;
 /// Pixels along the rim from one blade to the next below which there are none to be seen: what keeps step is a lamp's light.
 const LEAST_APART_PX: f32 = 5.0;
@@ -126,7 +126,7 @@ impl Measurement {
         }
         // What shows on less than half of its way around, all of which is in view, may be part of something larger.
         let Disc { x_px, y_px, radius_px } = self.disc;
-        let in_part = rival > MOST_RIVAL
+        let in_part = rival > RIVAL_OF_ARC
             && settings.in_view().surrounds(x_px, y_px, AXIS_IN_VIEW * radius_px);
         if standing > MOST_STANDING || in_part {
             return self.refuse(Reason::Ambiguous);
