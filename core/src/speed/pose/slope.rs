@@ -162,11 +162,16 @@ impl Pose {
         let folded = periods >= FOLDED_PERIODS && self.in_period > 1;
         let untold = middle_us / half_us + self.ends_untold(&points, half_us);
         let mut trend = Trend::fit(&points, 1);
-        if folded {
+        let mut tries = 2 * u8::from(folded);
+        while tries > 0 {
+            tries -= 1;
+            if let Some(found) = Trend::fit(&points, self.in_period)
+                && trend.is_none_or(|trend| found.slope_error < trend.slope_error)
+            {
+                trend = Some(found);
+            }
             // The last one sees a part of its place, or some of the next: where two blades are tilted, another turn.
             points.pop();
-            let better = |folded: &Trend| trend.is_none_or(|t| folded.slope_error < t.slope_error);
-            trend = Trend::fit(&points, self.in_period).filter(better).or(trend);
         }
         let trend = trend?;
         let factor = student_over_normal(trend.degrees_of_freedom);
