@@ -26,15 +26,6 @@ impl Roi {
     pub const fn contains(self, x: u16, y: u16) -> bool {
         x >= self.x && y >= self.y && x - self.x < self.width_px && y - self.y < self.height_px
     }
-
-    /// Whether a place lies inside, by so many pixels.
-    #[must_use]
-    pub(crate) fn surrounds(&self, x_px: f32, y_px: f32, by_px: f32) -> bool {
-        let half = |px: u16| 0.5 * f32::from(px);
-        let off = |at_px: f32, from: u16, size: u16| (at_px - f32::from(from) - half(size)).abs();
-        off(x_px, self.x, self.width_px) + by_px <= half(self.width_px)
-            && off(y_px, self.y, self.height_px) + by_px <= half(self.height_px)
-    }
 }
 
 /// What the person chose; everything has a default that needs no knowledge of the rotor.
@@ -70,20 +61,6 @@ impl Settings {
             window_us: None,
             clock_sigma_ppm: 15.0,
             gyro_sigma_rad_s: UNCALIBRATED_RAD_S,
-        }
-    }
-
-    /// The part of the sensor that is looked at: of no width or height where nothing is.
-    #[must_use]
-    // Not inlined: flash is short.
-    #[inline(never)]
-    pub fn in_view(&self) -> Roi {
-        let Geometry { width_px, height_px } = self.geometry;
-        let roi = self.roi.unwrap_or(Roi { x: 0, y: 0, width_px, height_px });
-        Roi {
-            width_px: roi.width_px.min(width_px.saturating_sub(roi.x)),
-            height_px: roi.height_px.min(height_px.saturating_sub(roi.y)),
-            ..roi
         }
     }
 }

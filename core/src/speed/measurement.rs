@@ -19,7 +19,6 @@ use crate::math::TAU;
 use crate::reading::{Evidence, Frame, Reason, Speed, Status};
 use crate::registration::Icp;
 use crate::rotors::{Disc, Found};
-use crate::settings::Settings;
 use crate::store::{Even, Window};
 use doubt::Doubt;
 
@@ -34,6 +33,15 @@ const LEAST_EVENTS: usize = 200;
 /// Symmetry periods and revolutions that a lock needs in the window.
 const LOCK_PERIODS: f32 = 3.0;
 const LOCK_REVOLUTIONS: f32 = 2.0;
+
+/// What the person stated.
+#[derive(Clone, Copy, Debug)]
+pub struct Stated {
+    /// Blade count, when given.
+    pub blades: Option<u8>,
+    /// One standard deviation of the clock's error in ppm.
+    pub clock_sigma_ppm: f32,
+}
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Stage {
@@ -180,7 +188,7 @@ impl Measurement {
     pub fn step(
         &mut self,
         window: &Window<'_>,
-        settings: &Settings,
+        stated: &Stated,
         polar: &mut PolarTrack,
         bench: &mut Bench,
     ) -> bool {
@@ -188,9 +196,9 @@ impl Measurement {
         match self.stage {
             Stage::Track => self.track(window, polar, even),
             Stage::Newton => self.newton(window, polar),
-            Stage::Scan => self.scan(settings, polar, angular),
+            Stage::Scan => self.scan(polar, angular),
             Stage::Doubt => self.doubt(window, polar, angular, even),
-            Stage::Symmetry => self.symmetry(settings, polar, angular),
+            Stage::Symmetry => self.symmetry(stated, polar, angular),
             Stage::Overtone => self.overtone(polar, angular),
             Stage::Recovery => self.recovery(window, polar),
             Stage::Pose => self.pose(window, sums, walked, even),
@@ -200,7 +208,7 @@ impl Measurement {
             Stage::Lock => self.lock(window, icp),
             Stage::Fractional => self.fractional(window, icp),
             Stage::Verdict => {
-                self.verdict(window, settings);
+                self.verdict(window, stated);
                 self.stage = Stage::Done;
             }
             Stage::Done => {}

@@ -11,13 +11,18 @@ use nalgebra::{Matrix4, Vector4};
 
 use super::angular::{AngularSums, DIRECTIONS};
 use super::polar::PolarEvent;
-use crate::math::{TAU, Turn, TurnRate, larger, quick_sqrt};
+use crate::math::{TAU, Turn, TurnRate, larger, quick_sqrt, sqrt};
 use crate::rotors::Disc;
 
 /// Rings between centre and rim, each for both polarities: the innermost, within a rotor's inner edge, and those that a [`scan`] tells
 /// apart.
 const RINGS: usize = super::angular::BANKS / 2 + 1;
 const BANKS: usize = 2 * RINGS;
+
+/// Sum of the cosines of unrelated phases that none reach by chance, over the root of their number: four standard deviations. And the least
+/// number that tells.
+const STANDS_OUT: f32 = 2.83;
+const LEAST_BESIDE: f32 = 16.0;
 
 /// Phases of the rotor's pattern by ring and polarity.
 #[derive(Clone, Copy, Debug, Default)]
@@ -62,10 +67,37 @@ impl Pattern {
         let mut total = 0.0;
         for (sum, count) in self.sums.iter().zip(self.counts) {
             let excess = sum.0 * sum.0 + sum.1 * sum.1 - count as f32;
-            in_step += crate::math::sqrt(excess.max(0.0));
+            in_step += sqrt(excess.max(0.0));
             total += count as f32;
         }
         in_step / total.max(1.0)
+    }
+
+    /// Whether so many events that lie where fewest keep step, in half of all directions, that they would tell, keep no more step than chance
+    /// makes.
+    #[must_use]
+    // Not inlined: flash is short.
+    #[inline(never)]
+    pub fn is_arc(track: &[PolarEvent], disc: Disc, omega_rad_s: f32, harmonic: u32) -> bool {
+        let turns = Self::learn(track, disc, omega_rad_s, harmonic).turns();
+        let rate = TurnRate::from_rad_s(omega_rad_s);
+        // Where they lie, as much as they keep step; then what lies on the other side.
+        let (mut x, mut y) = (0.0, 0.0);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for beside in [false, true] {
+            for event in track {
+                let psi = phase(*event, rate, harmonic).minus(turns[bank(*event, disc)]);
+                let in_step = psi.sin_cos().1;
+                let (sin, cos) = event.angle().sin_cos();
+                if !beside {
+                    (x, y) = (x + in_step * cos, y + in_step * sin);
+                } else if x * cos + y * sin < 0.0 {
+                    sum += in_step;
+                    count += 1.0;
+                }
+            }
+        }
+        count > LEAST_BESIDE && sum < STANDS_OUT * sqrt(count)
     }
 
     fn turns(&self) -> [Turn; BANKS] {

@@ -4,7 +4,7 @@
 //! all that is asked here, of many at once; what else an event may be is told elsewhere, one by one.
 
 use crate::event::{Geometry, PackedEvent};
-use crate::settings::{Roi, Settings};
+use crate::settings::Settings;
 
 /// Bits above row and column of a packed event, which a sum carries into.
 const ABOVE: u32 = 1 << PackedEvent::COLUMN_AT | 1 << (2 * PackedEvent::COLUMN_AT);
@@ -45,8 +45,12 @@ impl Gate {
     /// A gate for events from `last_us` on and before `end_us`, both in microseconds; `None` when nothing is in view.
     pub fn new(settings: &Settings, last_us: u64, end_us: u64) -> Option<Self> {
         let sensor = settings.geometry;
-        let Roi { x: x0, y: y0, width_px, height_px } = settings.in_view();
-        let (x1, y1) = (x0.saturating_add(width_px), y0.saturating_add(height_px));
+        let whole = (0, 0, sensor.width_px, sensor.height_px);
+        let (x0, y0, x1, y1) = settings.roi.map_or(whole, |roi| {
+            let (x1, y1) =
+                (roi.x.saturating_add(roi.width_px), roi.y.saturating_add(roi.height_px));
+            (roi.x, roi.y, x1.min(sensor.width_px), y1.min(sensor.height_px))
+        });
         let word = |x: u16, y: u16| u32::from(x) << PackedEvent::COLUMN_AT | u32::from(y);
         (x0 < x1 && y0 < y1).then(|| Self {
             low_us: last_us as u32,

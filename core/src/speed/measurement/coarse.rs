@@ -3,17 +3,15 @@
 
 use super::baselines::REFINEMENT_PERIODS;
 use super::doubt::Doubt;
-use super::{LEAST_EVENTS, Measurement, Stage};
+use super::{LEAST_EVENTS, Measurement, Stage, Stated};
 use crate::math::TAU;
 use crate::reading::{Reason, Speed, Status};
 use crate::registration::Icp;
-use crate::rotors::Disc;
-use crate::settings::Settings;
 use crate::speed::angular::AngularSums;
 use crate::speed::baseline::Estimate;
 use crate::speed::initial::{Ladder, median};
 use crate::speed::path::Path;
-use crate::speed::phase::{newton, scan};
+use crate::speed::phase::{Pattern, newton, scan};
 use crate::speed::polar::{PolarEvent, PolarTrack};
 use crate::speed::symmetry::{LEAST_ALIKE, mark_harmonic, symmetry, turn_back};
 use crate::store::{WINDOW_SEGMENTS, Window};
@@ -24,10 +22,9 @@ const NEWTON_STEPS: u8 = 6;
 const LAST_STEP_PX: f32 = 0.1;
 /// Share in step of the second best harmonic over that of the best: beyond this the pattern stands, or the centre is off.
 const MOST_STANDING: f32 = 0.8;
-/// The same of the rival of what is seen all around: one that shows on half of its way only has 0.64. In random scenes rotors have 0.6 at
-/// most, and 0.79 with their axis in a corner of the picture; with that in view by a share of their radius, 0.51.
+/// The same of the rival of what shows on less than half of its way around: that of half has 0.64. So has one whose blades show more there than
+/// elsewhere, against what is behind or to a busy readout, but what there is of it keeps step all around.
 const RIVAL_OF_ARC: f32 = 0.7;
-const AXIS_IN_VIEW: f32 = 0.3;
 /// Pixels along the rim from one blade to the next below which there are none to be seen: what keeps step is a lamp's light.
 const LEAST_APART_PX: f32 = 5.0;
 /// Two coarse speeds contradict each other when they differ by more than half the way to the next speed that the line
@@ -92,12 +89,7 @@ impl Measurement {
     }
 
     /// Which harmonic of the line turns about the refined centre: first coarse witness.
-    pub(super) fn scan(
-        &mut self,
-        settings: &Settings,
-        polar: &[PolarEvent],
-        angular: &mut AngularSums,
-    ) {
+    pub(super) fn scan(&mut self, polar: &[PolarEvent], angular: &mut AngularSums) {
         let line_hz = self.omega_rad_s.abs() * self.harmonic as f32 / TAU;
         let scan = scan(angular, polar, self.disc, line_hz);
         let standing = scan.second_share / scan.share.max(1e-3);
@@ -124,11 +116,10 @@ impl Measurement {
             self.stage = Stage::Track;
             return;
         }
-        // What shows on less than half of its way around, all of which is in view, may be part of something larger.
-        let Disc { x_px, y_px, radius_px } = self.disc;
-        let in_part = rival > RIVAL_OF_ARC
-            && settings.in_view().surrounds(x_px, y_px, AXIS_IN_VIEW * radius_px);
-        if standing > MOST_STANDING || in_part {
+        // What shows on less than half of its way around may be part of something larger.
+        let on_arc = rival > RIVAL_OF_ARC
+            && Pattern::is_arc(polar, self.disc, self.omega_rad_s, self.harmonic);
+        if standing > MOST_STANDING || on_arc {
             return self.refuse(Reason::Ambiguous);
         }
         if TAU * self.disc.radius_px < LEAST_APART_PX * self.harmonic as f32 {
@@ -143,7 +134,7 @@ impl Measurement {
     /// Angle of symmetry, some events a step.
     pub(super) fn symmetry(
         &mut self,
-        settings: &Settings,
+        stated: &Stated,
         polar: &[PolarEvent],
         angular: &mut AngularSums,
     ) {
@@ -158,10 +149,10 @@ impl Measurement {
             return;
         }
         let symmetry = symmetry(angular);
-        self.parts = settings.blades.or(symmetry.parts);
+        self.parts = stated.blades.or(symmetry.parts);
         // What was not counted is many parts, unless they are as little alike as the edges of one.
         let least = if self.parts.is_some() { ALIKE_SCORE } else { LEAST_ALIKE };
-        self.alike = self.parts == Some(1) || settings.blades.is_none() && symmetry.score >= least;
+        self.alike = self.parts == Some(1) || stated.blades.is_none() && symmetry.score >= least;
         self.evidence.symmetry_score = Some(symmetry.score);
         self.stage = Stage::Overtone;
     }

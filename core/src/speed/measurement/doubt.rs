@@ -21,9 +21,10 @@ const IN_DOUBT: f32 = 0.6;
 /// The same of another harmonic at its own best place, from which on not even edges do.
 const MOST_RIVAL: f32 = 0.9;
 /// Blur of the edges in windings, where there is an overtone, below which it settles any doubt. In random scenes of small rotors in a
-/// hand that of wrong harmonics was from 0.44, that of right ones mostly 0.1 to 0.4; of larger ones in doubt it was 0.66, and 0.31 at most but
-/// for one of 65.
+/// hand that of wrong harmonics was from 0.44, that of right ones mostly 0.1 to 0.4.
 const SETTLED_BLUR: f32 = 0.35;
+/// The same from which on it settles none of a larger rotor's, either: of a wrong one it was 0.66, of right ones 0.4 at most but for one of 66.
+const UNSETTLED_BLUR: f32 = 0.5;
 /// Radius in pixels below which a centre that is off by two or three pixels fits the overtone as well.
 pub(super) const SMALL_PX: f32 = 20.0;
 /// Pixels that a hand may move the axis by within a window. About a centre that is off by R / m, a harmonic m looks like its
@@ -183,17 +184,17 @@ fn keep(polar: &mut PolarTrack, moment: bool) {
 }
 
 impl Measurement {
-    /// Whether another harmonic keeps step almost as well, and no sharp overtone settles it; or does so about its own best place, and no
-    /// overtone at all, where a centre that is off by little does not lead from one to the next.
+    /// Whether another harmonic keeps step almost as well wherever the centre is thought to be, and no overtone settles it: only a sharp
+    /// one does where a centre that is off by little leads from one to the next.
     pub(super) fn in_doubt(&self) -> bool {
         if self.has_overtone_within(SETTLED_BLUR) {
             return false;
         }
-        let settled = self.pose.has_overtone() && self.disc.radius_px >= SMALL_PX;
+        let settled = self.has_overtone_within(UNSETTLED_BLUR) && self.disc.radius_px >= SMALL_PX;
         let rivalled = |doubt: &Doubt| {
             (doubt.small || !settled) && doubt.rival_share > MOST_RIVAL * doubt.share
         };
-        self.standing() > IN_DOUBT || self.doubt.as_ref().is_some_and(rivalled)
+        !settled && self.standing() > IN_DOUBT || self.doubt.as_ref().is_some_and(rivalled)
     }
 
     /// Whether the centre is to be looked about, as another harmonic keeps step too.

@@ -2,10 +2,9 @@
 
 use super::super::baseline::Estimate;
 use super::baselines::FRACTION;
-use super::{ACCELERATION_SIGMAS, Measurement};
+use super::{ACCELERATION_SIGMAS, Measurement, Stated};
 use crate::math::{TAU, sqrt};
 use crate::reading::{Evidence, Reason, Status};
-use crate::settings::Settings;
 use crate::speed::folding::look_us;
 use crate::speed::queue::stretch;
 use crate::speed::statistics::root_sum_square;
@@ -85,7 +84,7 @@ const ROLL_APART: f32 = 5.7;
 
 impl Measurement {
     /// Combines the witnesses of the lock, or says why the reading stays coarse.
-    pub(super) fn verdict(&mut self, window: &Window<'_>, settings: &Settings) {
+    pub(super) fn verdict(&mut self, window: &Window<'_>, stated: &Stated) {
         let witness = |omega: Option<f32>, sigma: Option<f32>| {
             Some(Estimate { omega_rad_s: omega?, sigma_rad_s: sigma? })
         };
@@ -146,7 +145,7 @@ impl Measurement {
             self.estimate = Estimate { sigma_rad_s: both.sigma_rad_s.max(sigma_rad_s), ..both };
         }
         self.take_out_growth();
-        self.widen(window, settings, held_up, lock.is_some());
+        self.widen(window, stated, held_up, lock.is_some());
     }
 
     /// Takes the turn out that growth makes of curved blades: all witnesses follow edges at a given distance from the axis.
@@ -159,9 +158,9 @@ impl Measurement {
     }
 
     /// Adds what the witnesses do not know of to the error, clock, camera and readout, or refuses where that is too much.
-    fn widen(&mut self, window: &Window<'_>, settings: &Settings, held_up: f32, locks: bool) {
+    fn widen(&mut self, window: &Window<'_>, stated: &Stated, held_up: f32, locks: bool) {
         let window_s = window.duration_us as f32 * 1e-6;
-        let clock = settings.clock_sigma_ppm * 1e-6 * self.estimate.omega_rad_s;
+        let clock = stated.clock_sigma_ppm * 1e-6 * self.estimate.omega_rad_s;
         let roll = if self.drift_px_s > STILL_PX_S {
             ROLL_RAD_PER_PX * self.drift_px_s * roll_share(window_s)
         } else {
