@@ -300,4 +300,21 @@ mod tests {
             assert!(found.rival_share < 0.15, "{found:?}");
         }
     }
+
+    #[test]
+    fn an_arc_keeps_step_on_one_side_only() {
+        let (windings, line_hz) = (3, 120.0);
+        let omega_rad_s = line_hz * TAU / windings as f32;
+        let is_arc = |track: &[PolarEvent]| Pattern::is_arc(track, DISC, omega_rad_s, 3);
+        let whole = pattern(windings, line_hz);
+        assert!(!is_arc(&whole));
+        let right = |event: &&PolarEvent| event.angle().sin_cos().1 > 0.3;
+        let arc: Vec<_> = whole.iter().filter(right).copied().collect();
+        // With nothing beside it, an arc may as well be a rotor that shows on one side.
+        assert!(!is_arc(&arc));
+        let unrelated = pattern(windings, 777.0);
+        let beside = unrelated.iter().filter(|event| !right(event)).copied();
+        let before_noise: Vec<_> = arc.into_iter().chain(beside).collect();
+        assert!(is_arc(&before_noise));
+    }
 }

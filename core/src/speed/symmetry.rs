@@ -217,4 +217,14 @@ mod tests {
             assert_eq!(found.parts.map(u32::from), Some(parts), "{found:?}");
         }
     }
+
+    #[test]
+    fn a_broad_mark_without_polarity_is_shown_by_a_harmonic_that_its_edges_add_up_in() {
+        let quarter_rad = 0.25 * crate::math::TAU;
+        let found = mark_harmonic(&edges(1, quarter_rad, false));
+        assert!(matches!(found, Some(4 | 8)), "{found:?}");
+        // Where edges are told apart by their polarity, or hardly are two, all harmonics show it.
+        assert_eq!(mark_harmonic(&edges(1, quarter_rad, true)), None);
+        assert_eq!(mark_harmonic(&edges(1, 0.02, false)), None);
+    }
 }
