@@ -22,7 +22,7 @@ const FOCAL_PX: f32 = 400.0;
 /// Standard error of the growth of what moves across the line of sight, over its way across in radii: its hub, its rim and what is behind it
 /// show edges then that blades alone do not.
 const ACROSS_SIGMA: f32 = 0.1;
-/// Most of that way in pixels that tells: a hand goes to and fro.
+/// Most of the way in pixels that a hand's speed tells: it goes to and fro.
 const MOST_ACROSS_PX: f32 = 3.0;
 /// Standard error of what growth seems to turn, as a share of it: what leaves the disc at its rim and comes into it at its hub makes growth
 /// seem less, and a sweep may differ from ring to ring.
@@ -99,8 +99,8 @@ impl Pose {
         let usual = across_px_s / FOCAL_PX;
         let usual = usual * usual;
         // What drifts too slowly to be called moving shows another background in one half than in the other all the same.
-        let across_px = larger(across_px_s * apart_s, self.path.half_to_half_px());
-        let seeming = across_px.min(MOST_ACROSS_PX) / self.disc.radius_px;
+        let to_and_fro_px = (across_px_s * apart_s).min(MOST_ACROSS_PX);
+        let seeming = larger(to_and_fro_px, self.path.half_to_half_px()) / self.disc.radius_px;
         let (growth, variance) = seen.half_to_half();
         let variance = variance + ACROSS_SIGMA * ACROSS_SIGMA * seeming * seeming;
         let (rate, variance) = (growth / apart_s, variance / (apart_s * apart_s));
