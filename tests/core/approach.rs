@@ -7,19 +7,26 @@ use evtach_host::synth::scene::{Background, Camera, Shape};
 use evtach_host::synth::{Model, Rotor, Scene, generate};
 
 const RPM: f64 = 700.0;
+/// Of a fan that a hand drifts before for many of its turns.
+const SLOW_RPM: f64 = 66.0;
+
+/// Lets what is seen grow so fast, as a share in a second, about the place of an axis.
+fn grow(events: &mut [Event], growth_per_s: f64) {
+    let axis = Rotor::default();
+    for event in events {
+        let grown = (growth_per_s * (event.t_us as f64 * 1e-6 - 0.15)).exp();
+        let along = |px: u16, axis: f64| (axis + grown * (f64::from(px) - axis)).round() as u16;
+        (event.x, event.y) = (along(event.x, axis.x_px), along(event.y, axis.y_px));
+    }
+}
 
 /// What is seen of a swept fan that grows so fast, as a share in a second, about its axis.
 fn fan(rpm: f64, growth_per_s: f64, duration_ms: f64) -> (Vec<Event>, Geometry) {
     let rotor = Rotor { rpm, blades: 4, shape: Shape::Swept, radius_px: 55.0, ..Rotor::default() };
     let scene = Scene { rotors: vec![rotor], duration_ms, seed: 11, ..Scene::default() };
     let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
-    let axis = Rotor::default();
     let mut events = generate(&scene).expect("a scene in range").events;
-    for event in &mut events {
-        let grown = (growth_per_s * (event.t_us as f64 * 1e-6 - 0.15)).exp();
-        let along = |px: u16, axis: f64| (axis + grown * (f64::from(px) - axis)).round() as u16;
-        (event.x, event.y) = (along(event.x, axis.x_px), along(event.y, axis.y_px));
-    }
+    grow(&mut events, growth_per_s);
     (events, geometry)
 }
 
@@ -64,10 +71,12 @@ fn what_does_not_come_nearer_is_as_sure_as_ever() {
     assert!(!locked.is_empty() && locked.iter().all(|(_, sigma)| *sigma < 5e-5), "{errors:?}");
 }
 
-/// How far each lock of a fan is off, and its standard error, in revolutions a minute.
-fn locked(scene: &Scene, rpm: f64) -> Vec<(f32, f32)> {
+/// How far each lock of a fan that grows so fast is off, and its standard error, in revolutions a minute.
+fn locked(scene: &Scene, rpm: f64, growth_per_s: f64) -> Vec<(f32, f32)> {
     let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
-    let events = generate(scene).expect("a scene in range").events;
+    let mut events = generate(scene).expect("a scene in range").events;
+    grow(&mut events, growth_per_s);
+    events.retain(|event| event.x < scene.width_px && event.y < scene.height_px);
     let (readings, _) = measure_events(&events, &[], Settings::new(geometry), Capacity::Full);
     readings
         .iter()
@@ -97,7 +106,7 @@ fn a_hand_that_moves_across_brings_nothing_nearer() {
             seed,
             ..Scene::default()
         };
-        let locked = locked(&scene, rpm);
+        let locked = locked(&scene, rpm, 0.0);
         assert!(are_within(&locked, 4.0), "{locked:?}");
     }
 }
@@ -126,17 +135,15 @@ fn a_hand_that_slowly_drifts_brings_nothing_nearer() {
             seed,
             ..Scene::default()
         };
-        let locked = locked(&scene, rpm);
+        let locked = locked(&scene, rpm, 0.0);
         assert!(are_within(&locked, 3.0), "{locked:?}");
     }
 }
 
-/// It goes on for longer than a hand that goes to and fro, and as far as what is behind the rotor shows another part of itself.
-#[test]
-fn a_drift_is_as_far_as_it_goes() {
-    let rpm = 66.0;
+/// A slow fan before a hand that drifts for long.
+fn drifting(seed: u64) -> Scene {
     let rotor = Rotor {
-        rpm,
+        rpm: SLOW_RPM,
         blades: 4,
         shape: Shape::Swept,
         radius_px: 38.0,
@@ -145,15 +152,35 @@ fn a_drift_is_as_far_as_it_goes() {
     };
     let camera =
         Camera { tremor_px: 2.3, tremor_mrad: 2.3, drift_px_s: [6.2, -0.4], ..Camera::default() };
-    let scene = Scene {
+    Scene {
         rotors: vec![rotor],
         camera,
         background: Background { contrast: 0.324, boxes: 8, ..Background::default() },
         duration_ms: 2500.0,
-        seed: 12,
+        seed,
         ..Scene::default()
-    };
-    let locked = locked(&scene, rpm);
+    }
+}
+
+/// It goes on for longer than a hand that goes to and fro, and as far as what is behind the rotor shows another part of itself.
+#[test]
+fn a_drift_is_as_far_as_it_goes() {
+    let locked = locked(&drifting(12), SLOW_RPM, 0.0);
     assert!(are_within(&locked, 3.0), "{locked:?}");
-    assert!(locked.iter().all(|(_, sigma)| f64::from(*sigma) < 5e-4 * rpm), "{locked:?}");
+    // What it seems to grow by is not taken out, but for all that is known it might.
+    let is_near = |(off, sigma): &(f32, f32)| {
+        f64::from(off.abs()) < 1e-3 * SLOW_RPM && f64::from(*sigma) < 2e-3 * SLOW_RPM
+    };
+    assert!(locked.iter().all(is_near), "{locked:?}");
+}
+
+/// What drifts by so much may come nearer by as much, and one window does not tell.
+#[test]
+fn a_drift_may_bring_nearer() {
+    for (seed, growth_per_s) in
+        [(3, 0.03), (9, 0.03), (12, 0.03), (12, -0.03), (3, -0.015), (9, 0.015)]
+    {
+        let locked = locked(&drifting(seed), SLOW_RPM, growth_per_s);
+        assert!(are_within(&locked, 4.0), "{seed} {growth_per_s}: {locked:?}");
+    }
 }

@@ -96,11 +96,15 @@ impl Pose {
         let apart_s = apart_us * 1e-6;
         let drift_px_s = self.drift_px_s();
         let across_px_s = if drift_px_s > MOVING_PX_S { drift_px_s } else { 0.0 };
-        let usual = across_px_s / FOCAL_PX;
-        let usual = usual * usual;
         // What drifts too slowly to be called moving shows another background in one half than in the other all the same.
+        let half_to_half_px = self.path.half_to_half_px();
         let to_and_fro_px = (across_px_s * apart_s).min(MOST_ACROSS_PX);
-        let seeming = larger(to_and_fro_px, self.path.half_to_half_px()) / self.disc.radius_px;
+        let seeming = larger(to_and_fro_px, half_to_half_px) / self.disc.radius_px;
+        // What drifts farther than a hand goes to and fro is likely to come nearer, or go away, as fast.
+        let drifts = half_to_half_px > MOST_ACROSS_PX;
+        let along_px_s = if drifts { half_to_half_px / apart_s } else { across_px_s };
+        let usual = along_px_s / FOCAL_PX;
+        let usual = usual * usual;
         let (growth, variance) = seen.half_to_half();
         let variance = variance + ACROSS_SIGMA * ACROSS_SIGMA * seeming * seeming;
         let (rate, variance) = (growth / apart_s, variance / (apart_s * apart_s));
@@ -114,7 +118,9 @@ impl Pose {
             // there, what only seems to come nearer would be several times what speeds are off by.
             let likely = usual / (usual + variance);
             let share = if stands_out { 1.0 } else { larger(likely, unusual * unusual) };
-            (0.0, share * rate)
+            let error = share * rate;
+            // Nor is it told that what drifts does not come nearer, where it does not seem to.
+            (0.0, if drifts { sqrt(error * error + likely * variance) } else { error })
         };
         let sigma_rad_s = self.sweep.abs() * error.abs();
         let speed = Estimate { omega_rad_s: self.sweep * taken, sigma_rad_s };
