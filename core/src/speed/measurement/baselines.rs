@@ -48,6 +48,8 @@ const MOST_START: f32 = 1e-2;
 const SAFE_SLIP: f32 = 0.33;
 
 impl Measurement {
+    // Not inlined: flash is short.
+    #[inline(never)]
     pub(super) fn pace(&self) -> Pace {
         Pace {
             disc: self.disc,
@@ -100,6 +102,8 @@ impl Measurement {
     }
 
     /// Advances the planned pairs; the finished set once all are registered.
+    // Not inlined: flash is short.
+    #[inline(never)]
     pub(super) fn advance(&mut self, window: &Window<'_>, icp: &mut Icp) -> Option<Pairs> {
         let pairs = self.pairs.as_mut()?;
         if pairs.step(window, self.pose.path(), icp) { self.pairs.take() } else { None }

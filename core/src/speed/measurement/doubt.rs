@@ -204,6 +204,8 @@ impl Measurement {
     }
 
     /// Whether there is any doubt: too much where no lock tells a harmonic from its neighbour.
+    // Not inlined: flash is short.
+    #[inline(never)]
     pub(super) fn doubted(&self) -> bool {
         self.standing() > DOUBTFUL
     }

@@ -78,6 +78,8 @@ impl Measurement {
     /// of a rotor that is not small is in doubt. Without polarity leading edges are matched with trailing ones, and what could not be counted
     /// may be a winding more than there are blades: only sharp ones tell. Few blades have edges all the same that a share of the radius
     /// calls blurred.
+    // Not inlined: flash is short.
+    #[inline(never)]
     pub(super) fn has_edges(&self, ignores_polarity: bool) -> bool {
         if self.in_doubt() || self.may_be_shaken() {
             return false;
@@ -120,6 +122,8 @@ impl Measurement {
 
     /// Whether the edges are so sharp that a registration that went astray does not count against them. Noise, which leads it
     /// astray, is no blur where no other harmonic keeps step.
+    // Not inlined: flash is short.
+    #[inline(never)]
     pub(super) fn sharp(&self) -> bool {
         let blur_px = if self.doubted() { self.pose.sharpness_px() } else { self.edges_px() };
         self.too_fast_for_edges() || blur_px < self.blur_px(LEAST_BLUR, MOST_JITTER_S)

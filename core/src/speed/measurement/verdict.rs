@@ -293,6 +293,8 @@ impl Measurement {
 
     /// From a hand, both witnesses of a mark's lock go along a path that takes part of the hand's motion for the mark's turn. The refinement
     /// goes along none: it is a third one, and no surer than they are, however little its few pairs scatter.
+    // Not inlined: flash is short.
+    #[inline(never)]
     fn steady_mark(&mut self) {
         let swaying = SWAYING_RAD_S / self.estimate.omega_rad_s.abs().max(SWAYING_RAD_S);
         self.widen_mark(SWAY_PX * swaying * swaying);
