@@ -60,6 +60,9 @@ const UNDER_WAY_RAD: f32 = 0.5;
 const PULLED_OFF_RAD: f32 = 0.5;
 const PULLED_UNDER_WAY_RAD: f32 = 0.3;
 
+/// Turns in the window from which on a path that is held back may drift: in fewer, an even drift looks like a turn, too.
+const DRIFTING_TURNS: f32 = 2.0;
+
 /// Root mean square speed of the axis in px/s from which on the camera moves: a hand makes some 80, and what few events scatter by
 /// looks like 20.
 pub const MOVING_PX_S: f32 = 25.0;
@@ -423,6 +426,7 @@ impl Pose {
             harmonic: self.harmonic,
             radius_px: self.disc.radius_px,
             omega_rad_s: self.omega_rad_s,
+            drifts: !self.still && self.walk_px < WALK_PX && self.turns() > DRIFTING_TURNS,
         };
         let moved_px = correct(&mut self.path, &sums.blocks, walk).unwrap_or(f32::MAX);
         if self.schedule.samples()
@@ -445,6 +449,11 @@ impl Pose {
         self.disc.x_px += x_px;
         self.disc.y_px += y_px;
         true
+    }
+
+    /// Turns in the window.
+    fn turns(&self) -> f32 {
+        self.omega_rad_s.abs() * self.window_us * (1e-6 / TAU)
     }
 
     /// Whether blocks are as long as few events make them.

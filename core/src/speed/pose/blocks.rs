@@ -3,7 +3,7 @@
 use heapless::Vec;
 use nalgebra::{Matrix3, Vector3};
 
-use super::super::path::Path;
+use super::super::path::{Knot, Path};
 use crate::limits::MAX_KNOTS;
 
 /// Fewest events in a block that counts.
@@ -29,6 +29,8 @@ pub const STILL_WALK_PX: f32 = 0.003;
 /// Turn beyond an even one from knot to knot, in rad/s: what a hand rolls, and as a share of the speed, what a motor hunts.
 const WALK_RAD_S: f32 = 0.2;
 const WALK_SHARE: f32 = 0.01;
+/// How much farther a drift goes than blocks that know little of it would move it, at most.
+const MOST_FREED: f32 = 10.0;
 /// Farthest that a knot is moved at once.
 const STRIDE_PX: f32 = 3.0;
 
@@ -199,11 +201,56 @@ pub struct Walk {
     pub radius_px: f32,
     /// Its speed in rad/s.
     pub omega_rad_s: f32,
+    /// Whether the axis may drift as far as it likes, as long as it does so evenly.
+    pub drifts: bool,
+}
+
+/// A product.
+// Not inlined, as it is taken twice: flash is short.
+#[inline(never)]
+fn times(a: &Matrix3<f32>, b: &Matrix3<f32>) -> Matrix3<f32> {
+    a * b
+}
+
+/// From one knot to another: turn, and shift along both axes.
+fn between(a: &Knot, b: &Knot) -> Vector3<f32> {
+    Vector3::new(b.turn_rad - a.turn_rad, b.x_px - a.x_px, b.y_px - a.y_px)
+}
+
+/// The same from the first one to the last.
+// Not inlined: flash is short.
+#[inline(never)]
+fn apart(knots: &[Knot]) -> Vector3<f32> {
+    knots.first().zip(knots.last()).map_or(Vector3::zeros(), |(first, last)| between(first, last))
+}
+
+/// Moves the ends of a path on, as far apart as the blocks want them, which `moved` them so far: they are held back by what the axis walks, the
+/// more, the more its `cost` is beside what the blocks know of a drift. Returns by how many pixels an end moved at most.
+// Not inlined: flash is short.
+#[inline(never)]
+fn free_drift(knots: &mut [Knot], blocks: &[Block], moved: Vector3<f32>, cost: f32) -> f32 {
+    let per_block = 1.0 / blocks.len().max(1) as f32;
+    let mut known = f32::MIN_POSITIVE;
+    for (k, block) in blocks.iter().enumerate() {
+        let far = (k as f32 + 0.5) * per_block - 0.5;
+        let [xx, _, yy] = block.products;
+        known += 0.5 * (xx + yy) * block.share() * far * far;
+    }
+    let more = moved * (cost * per_block / known).min(MOST_FREED);
+    let more = more.map(|px| px.clamp(-2.0 * STRIDE_PX, 2.0 * STRIDE_PX));
+    for (k, knot) in knots.iter_mut().enumerate() {
+        let far = k as f32 * per_block - 0.5;
+        knot.x_px += far * more[1];
+        knot.y_px += far * more[2];
+    }
+    0.5 * more[1].abs().max(more[2].abs())
 }
 
 /// Moves the knots to where the blocks want them: least squares with a path that walks rather than jumps, a
 /// tridiagonal system of 3 x 3 matrices, solved from end to end. Returns how far the rim moved at most, in pixels, or `None`
 /// where the blocks give no path.
+// Not inlined: flash is short.
+#[inline(never)]
 pub fn correct(path: &mut Path, blocks: &[Block; MAX_KNOTS], walk: Walk) -> Option<f32> {
     let blocks = &blocks[..path.blocks()];
     let walk_rad = (WALK_RAD_S + WALK_SHARE * walk.omega_rad_s.abs()) * path.step_us() * 1e-6;
@@ -211,16 +258,14 @@ pub fn correct(path: &mut Path, blocks: &[Block; MAX_KNOTS], walk: Walk) -> Opti
     let m = walk.harmonic as f32;
     let scatter = 1.0 / (2.0 * walk.coherence.max(LEAST_SHARE));
     let (px, rad) = (scatter / (walk.step_px * walk.step_px), scatter / (walk_rad * walk_rad));
-    let stiff = Matrix3::from_diagonal(&Vector3::new(rad, px, px));
-    // A speed that is off from the start is no walk.
-    let even_rad = match (knots.first(), knots.last()) {
-        (Some(first), Some(last)) => (last.turn_rad - first.turn_rad) / blocks.len().max(1) as f32,
-        _ => 0.0,
-    };
-    let step = |k: usize| -> Option<Vector3<f32>> {
-        let (a, b) = (knots.get(k)?, knots.get(k + 1)?);
-        Some(Vector3::new(b.turn_rad - a.turn_rad - even_rad, b.x_px - a.x_px, b.y_px - a.y_px))
-    };
+    let costs = Vector3::new(rad, px, px);
+    let stiff = Matrix3::from_diagonal(&costs);
+    // A speed that is off from the start is no walk, nor is a drift where it is free.
+    let free = if walk.drifts { 1.0 } else { 0.0 };
+    let per_block = 1.0 / blocks.len().max(1) as f32;
+    let was_apart = apart(knots);
+    let even = was_apart.component_mul(&Vector3::new(1.0, free, free)) * per_block;
+    let step = |k: usize| Some(between(knots.get(k)?, knots.get(k + 1)?) - even);
     let link = |block: &Block| block.weight(m) * block.shares().1 - stiff;
     let mut inverses = Vec::<Matrix3<f32>, MAX_KNOTS>::new();
     let mut sides = Vec::<Vector3<f32>, MAX_KNOTS>::new();
@@ -230,15 +275,18 @@ pub fn correct(path: &mut Path, blocks: &[Block; MAX_KNOTS], walk: Walk) -> Opti
         if let (Some(block), Some(step)) = (blocks.get(k), step(k)) {
             let (right, later) = (Vector3::from(block.right), Vector3::from(block.later));
             pivot += block.weight(m) * block.shares().0 + stiff;
-            side += (right - later) * m + stiff * step;
+            side += (right - later) * m + costs.component_mul(&step);
         }
         let before = k
             .checked_sub(1)
             .and_then(|i| Some((blocks.get(i)?, step(i)?, inverses.get(i)?, sides.get(i)?)));
         if let Some((block, step, inverse, before)) = before {
             let link = link(block);
-            pivot += block.weight(m) * block.shares().2 + stiff - link * inverse * link;
-            side += Vector3::from(block.later) * m - stiff * step - link * (inverse * before);
+            pivot +=
+                block.weight(m) * block.shares().2 + stiff - times(&times(&link, inverse), &link);
+            side += Vector3::from(block.later) * m
+                - costs.component_mul(&step)
+                - link * (inverse * before);
         }
         inverses.push(pivot.try_inverse()?).ok();
         sides.push(side).ok();
@@ -259,6 +307,10 @@ pub fn correct(path: &mut Path, blocks: &[Block; MAX_KNOTS], walk: Walk) -> Opti
         knot.x_px += x_px;
         knot.y_px += y_px;
         knot.turn_rad += turn_rad;
+    }
+    if walk.drifts {
+        let moved = apart(knots) - was_apart;
+        most_px += free_drift(knots, blocks, moved, px / (m * m));
     }
     Some(most_px)
 }
@@ -289,5 +341,50 @@ mod tests {
         assert!(lapsed(&blocks(4.0, chance), 0.3, 4));
         // The same by themselves are but a period.
         assert!(!lapsed(&blocks(4.0, [0.8, -0.4, 0.4, 0.8]), 0.3, 4));
+    }
+
+    const DRIFT_PX: f32 = 8.0;
+
+    /// How far the ends of a path are apart along x after some rounds that saw a mark whose axis drifts so, and may or not.
+    fn followed_px(drifts: bool) -> f32 {
+        const COUNT: u16 = 40;
+        let m = 4;
+        let mut path = Path::STILL.divided(-500_000.0, 25_000.0, usize::from(COUNT));
+        let walk = Walk {
+            step_px: WALK_SINGLE_PX,
+            coherence: 0.9,
+            harmonic: m,
+            radius_px: 40.0,
+            omega_rad_s: 19.0,
+            drifts,
+        };
+        for _ in 0..3 {
+            let mut seen = [Block::EMPTY; MAX_KNOTS];
+            for (k, block) in (0..COUNT).zip(&mut seen) {
+                // Three turns in the window.
+                let angle = 19.0 * f32::from(k) / f32::from(COUNT);
+                for ring in 1..=30_u16 {
+                    let r_px = 10.0 + f32::from(ring);
+                    let (x, y) = (-libm::sinf(angle) / r_px, libm::cosf(angle) / r_px);
+                    let knot = path.at(path.time_us(usize::from(k), 0.5));
+                    let left_px =
+                        DRIFT_PX * ((f32::from(k) + 0.5) / f32::from(COUNT) - 0.5) - knot.x_px;
+                    let psi = m as f32 * (x * left_px - y * knot.y_px - knot.turn_rad);
+                    let (sin_psi, cos_psi) = (libm::sinf(psi), libm::cosf(psi));
+                    let f = 0.5;
+                    block.add(&Seen { block: 0, x, y, sin_psi, cos_psi, f, weight: 1.0 });
+                }
+            }
+            assert!(correct(&mut path, &seen, walk).is_some());
+        }
+        apart(path.knots())[1]
+    }
+
+    #[test]
+    fn a_path_that_is_held_back_follows_a_drift_all_the_same() {
+        let free_px = followed_px(true);
+        assert!((free_px - DRIFT_PX).abs() < 0.1 * DRIFT_PX, "{free_px}");
+        let held_px = followed_px(false);
+        assert!(held_px < 0.3 * DRIFT_PX, "{held_px}");
     }
 }
