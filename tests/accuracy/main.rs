@@ -6,6 +6,7 @@ mod gyro;
 mod lapses;
 mod layouts;
 mod mistaken;
+mod readout;
 mod recordings;
 mod series;
 mod settling;

@@ -9,6 +9,7 @@ mod verdict;
 
 use super::angular::AngularSums;
 use super::baseline::{Estimate, Pairs};
+use super::filling::{Filled, Filling};
 use super::initial::{Ladder, Rates};
 use super::path::Path;
 use super::phase::Pattern;
@@ -60,6 +61,7 @@ enum Stage {
     Further,
     Lock,
     Fractional,
+    Queue,
     Verdict,
     Done,
 }
@@ -74,6 +76,7 @@ pub struct Bench {
     angular: AngularSums,
     /// How the events of the window are gone through.
     even: Even,
+    filling: Filling,
 }
 
 impl Bench {
@@ -84,11 +87,13 @@ impl Bench {
         walked: Path::UNSET,
         angular: AngularSums::EMPTY,
         even: Even::EMPTY,
+        filling: Filling::EMPTY,
     };
 
     /// Makes ready for another measurement, whatever was left half done.
     pub const fn clear(&mut self) {
         self.even = Even::EMPTY;
+        self.filling = Filling::EMPTY;
     }
 }
 
@@ -126,6 +131,9 @@ pub struct Measurement {
     pairs: Option<Pairs>,
     estimate: Estimate,
     status: Status,
+    /// How a readout's queue filled as the window began, and whether it is seen to have done so.
+    filling: Filled,
+    filled: bool,
     /// Longest baseline of the lock.
     lock_baseline_s: f32,
     alpha_rad_s2: Option<f32>,
@@ -163,6 +171,8 @@ impl Measurement {
             pairs: None,
             estimate: Estimate::default(),
             status: Status::Refused(Reason::Searching),
+            filling: Filled::default(),
+            filled: false,
             lock_baseline_s: 0.0,
             alpha_rad_s2: None,
             drift_px_s: found.drift_px_s,
@@ -192,7 +202,7 @@ impl Measurement {
         polar: &mut PolarTrack,
         bench: &mut Bench,
     ) -> bool {
-        let Bench { icp, sums, walked, angular, even } = bench;
+        let Bench { icp, sums, walked, angular, even, filling } = bench;
         match self.stage {
             Stage::Track => self.track(window, polar, even),
             Stage::Newton => self.newton(window, polar),
@@ -207,6 +217,7 @@ impl Measurement {
             Stage::Further => self.further(window, icp),
             Stage::Lock => self.lock(window, icp),
             Stage::Fractional => self.fractional(window, icp),
+            Stage::Queue => self.queue(window, filling, angular),
             Stage::Verdict => {
                 self.verdict(window, stated);
                 self.stage = Stage::Done;
@@ -230,7 +241,7 @@ impl Measurement {
             Stage::Further => "further refinement",
             Stage::Lock => "lock",
             Stage::Fractional => "fractional test",
-            Stage::Verdict => "verdict",
+            Stage::Queue | Stage::Verdict => "verdict",
             Stage::Done => "done",
         }
     }
@@ -361,7 +372,7 @@ impl Measurement {
             },
             parts: self.parts,
             alike: self.alike,
-            lapsed: self.pose.lapsed(),
+            lapsed: self.pose.lapsed() && !self.filled,
             speed,
             roll_sigma_rad_s: self.roll_sigma_rad_s,
             evidence: self.evidence,

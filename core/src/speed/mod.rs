@@ -2,6 +2,7 @@
 
 pub mod angular;
 pub mod baseline;
+pub mod filling;
 pub mod folding;
 pub mod initial;
 pub mod measurement;

@@ -100,6 +100,24 @@ impl Pattern {
         count > LEAST_BESIDE && sum < STANDS_OUT * sqrt(count)
     }
 
+    /// Adds its sums to those of others.
+    pub fn add_to(&self, sums: &mut [Complex32]) {
+        for (sum, (re, im)) in sums.iter_mut().zip(self.sums) {
+            *sum += Complex32::new(re, im);
+        }
+    }
+
+    /// By how much it is ahead of the sums of others, weighed by how clearly both show each ring.
+    #[must_use]
+    pub fn ahead_of(&self, sums: &[Complex32]) -> Turn {
+        let (mut along, mut across) = (0.0, 0.0);
+        for (sum, (re, im)) in sums.iter().zip(self.sums) {
+            along += sum.re * re + sum.im * im;
+            across += sum.re * im - sum.im * re;
+        }
+        Turn::of_vector(across, along)
+    }
+
     fn turns(&self) -> [Turn; BANKS] {
         self.sums.map(|(re, im)| Turn::of_vector(im, re))
     }

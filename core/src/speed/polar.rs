@@ -97,8 +97,8 @@ impl PolarEvent {
         Self { t_us, angle, radius_polarity: radius | polarity }
     }
 
-    /// Converts one event; `mid_us` is the middle of the window since its start.
-    fn new(
+    /// Converts one event; `mid_us` is the time that counts as 0, since the window's start.
+    pub(super) fn new(
         event: StoredEvent,
         (dx, dy, r2): (f32, f32, f32),
         window: &Window<'_>,

@@ -5,8 +5,10 @@
 //! stretched, and all speeds are read too low by the same share; nothing else in the events' times tells.
 //!
 //! But while it fills, no event is lost. Where a rotor's pixels see few of the blades that pass, most are: the queue is full,
-//! and filled within the first moments of the window, or before. From then on all events are late alike.
+//! and filled within the first moments of the window, or before. From then on all events are late alike. And where the stream begins
+//! with the window, a rotor's phase shows how far it filled, and by when.
 
+use super::filling::Filled;
 use crate::math::larger;
 use crate::rotors::Disc;
 use crate::store::{StoredEvent, Window};
@@ -37,11 +39,36 @@ const LEAST_LEFT: f32 = 0.5;
 const TILT: f32 = 3.0;
 /// The same where the queue is full from any time on, or up to any, or between any two: by 1.5 y.
 const STEP: f32 = 1.5;
+/// What is seen to be off is off by all of it, where half of what may be counts.
+const FOUND: f32 = 2.0;
+/// Share of a whole queue by which the first events may be early for another reason than that it filled.
+const MOST_UNSEEN: f32 = 0.25;
 
-/// Share by which the time of the window may be stretched as a rotor's speed is read: 0 unless the readout was busy in it. At least so
-/// many blades of the rotor pass meanwhile. Cost: 25 000 instructions, and one pass over the window where it was.
+/// What a readout that was busy does to a window.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Held {
+    /// Share by which its time may be stretched as a rotor's speed is read.
+    pub stretch: f32,
+    /// Whether the queue is seen to fill as the window begins, so that the rotor is out of step there.
+    pub filled: bool,
+}
+
+/// Whether a readout has to do more than it can.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Busy {
+    /// At no time.
+    Never,
+    /// In a part of the window.
+    ForAWhile,
+    /// In all of it.
+    AllThrough,
+}
+
+/// How busy the readout was in a window. Cost: 25 000 instructions.
 #[must_use]
-pub fn stretch(window: &Window<'_>, disc: Disc, passes: f32) -> f32 {
+// Not inlined: flash is short.
+#[inline(never)]
+pub fn busy(window: &Window<'_>) -> Busy {
     let (mut scatter, mut degrees) = (0.0, 0_u32);
     let (mut busy, mut idle) = (false, false);
     // Where segments start, and where the last ends.
@@ -57,10 +84,22 @@ pub fn stretch(window: &Window<'_>, disc: Disc, passes: f32) -> f32 {
             degrees += groups;
         }
     }
-    let all_through = degrees >= LEAST_GROUPS && scatter < MOST_SCATTER * degrees as f32;
-    let for_a_while = busy && idle;
-    if !all_through && !for_a_while {
-        return 0.0;
+    if busy && idle {
+        Busy::ForAWhile
+    } else if degrees >= LEAST_GROUPS && scatter < MOST_SCATTER * degrees as f32 {
+        Busy::AllThrough
+    } else {
+        Busy::Never
+    }
+}
+
+/// What the readout does to a rotor's speed: nothing unless it was busy. At least so many blades of the rotor pass meanwhile.
+/// Cost: 25 000 instructions, and one pass over the window where it was.
+#[must_use]
+pub fn held(window: &Window<'_>, disc: Disc, passes: f32, seen: Filled) -> Held {
+    let busy = busy(window);
+    if busy == Busy::Never {
+        return Held::default();
     }
     let (mut arrived, mut of_rotor) = (0.0, [0.0_f32; 2]);
     for event in window.events() {
@@ -72,15 +111,20 @@ pub fn stretch(window: &Window<'_>, disc: Disc, passes: f32) -> f32 {
         }
     }
     let whole = QUEUE_EVENTS / larger(arrived, QUEUE_EVENTS);
-    if for_a_while {
-        return STEP * whole;
+    if busy == Busy::ForAWhile {
+        return Held { stretch: STEP * whole, filled: false };
     }
     let [off, on] = of_rotor;
-    let seen = core::f32::consts::PI * disc.radius_px * disc.radius_px * passes;
+    let passed = core::f32::consts::PI * disc.radius_px * disc.radius_px * passes;
     // Of so many that the pixels sent, these came: what is lost beside one that comes fills the queue, or would.
-    let came = larger(off, on) / larger(LEAST_LEFT * seen, larger(off, on));
-    let filled = whole * came / larger(1.0 - came, f32::MIN_POSITIVE);
-    if came < MOST_CAME { (TILT * filled * whole).min(whole) } else { whole }
+    let came = larger(off, on) / larger(LEAST_LEFT * passed, larger(off, on));
+    let took = whole * came / larger(1.0 - came, f32::MIN_POSITIVE);
+    // What is not seen to have filled may fill unseen, evenly through all of the window.
+    let unseen = (whole - seen.early).abs();
+    let filled = unseen < MOST_UNSEEN * whole;
+    let stretch = if filled { FOUND * seen.tilt.abs() + unseen } else { whole };
+    let stretch = if came < MOST_CAME { stretch.min(TILT * took * whole) } else { stretch };
+    Held { stretch, filled }
 }
 
 /// Variance of the time that a group of events takes over that of a Poisson process, times the degrees of freedom, and these: of the
@@ -145,7 +189,7 @@ mod tests {
             let polarity = polarities[(random(index) * 1e6) as usize % polarities.len()];
             store.push(&[PackedEvent::new(t_us as u32, 1, 1, polarity)], 0, |_, _| {});
         }
-        stretch(&store.window(6, u64::MAX), disc, passes)
+        held(&store.window(6, u64::MAX), disc, passes, Filled::default()).stretch
     }
 
     /// Exponentially distributed with a mean of one, from a hash.

@@ -113,7 +113,7 @@ impl Measurement {
     pub(super) fn refinement(&mut self, window: &Window<'_>, icp: &mut Icp) {
         let Some(pairs) = self.advance(window, icp) else { return };
         let Some(refined) = pairs.middle() else {
-            self.stage = Stage::Verdict;
+            self.stage = Stage::Queue;
             return;
         };
         self.evidence.refined_rad_s = Some(refined.omega_rad_s);
@@ -122,7 +122,7 @@ impl Measurement {
             if self.registers() {
                 return self.refuse(Reason::Ambiguous);
             }
-            self.stage = Stage::Verdict;
+            self.stage = Stage::Queue;
             return;
         }
         self.plan(window, REFINEMENT_PERIODS, self.worth(FURTHER, PAIR_EVENTS));
@@ -216,6 +216,6 @@ impl Measurement {
             self.plan_lock_pairs(window, periods, FRACTIONAL_AGAIN);
             return;
         }
-        self.stage = Stage::Verdict;
+        self.stage = Stage::Queue;
     }
 }

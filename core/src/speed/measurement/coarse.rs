@@ -223,7 +223,7 @@ impl Measurement {
         self.estimate = Estimate { omega_rad_s: self.omega_rad_s, sigma_rad_s: spread };
         self.status = Status::Coarse;
         if periods < 1.0 + REFINEMENT_PERIODS {
-            self.stage = Stage::Verdict;
+            self.stage = Stage::Queue;
             return;
         }
         self.plan_refinement(window);

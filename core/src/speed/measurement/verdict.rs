@@ -2,11 +2,13 @@
 
 use super::super::baseline::Estimate;
 use super::baselines::FRACTION;
-use super::{ACCELERATION_SIGMAS, Measurement, Stated};
+use super::{ACCELERATION_SIGMAS, Measurement, Stage, Stated};
 use crate::math::{TAU, sqrt};
 use crate::reading::{Evidence, Reason, Status};
+use crate::speed::angular::AngularSums;
+use crate::speed::filling::Filling;
 use crate::speed::folding::look_us;
-use crate::speed::queue::stretch;
+use crate::speed::queue::{Busy, busy, held};
 use crate::speed::statistics::root_sum_square;
 use crate::store::Window;
 use crate::tachometer::BASE_WINDOW_US;
@@ -83,6 +85,23 @@ const ROLL_LASTS_S: f32 = 0.067;
 const ROLL_APART: f32 = 5.7;
 
 impl Measurement {
+    /// Asks how the queue of a readout filled that is busy from the start of the stream on.
+    pub(super) fn queue(
+        &mut self,
+        window: &Window<'_>,
+        filling: &mut Filling,
+        angular: &mut AngularSums,
+    ) {
+        if window.is_first() && busy(window) == Busy::AllThrough {
+            let omega_rad_s = self.evidence.phase_rad_s.unwrap_or(self.omega_rad_s);
+            let filled =
+                filling.step(window, self.disc, omega_rad_s, self.harmonic, &mut angular.sums[0]);
+            let Some(filled) = filled else { return };
+            self.filling = filled;
+        }
+        self.stage = Stage::Verdict;
+    }
+
     /// Combines the witnesses of the lock, or says why the reading stays coarse.
     pub(super) fn verdict(&mut self, window: &Window<'_>, stated: &Stated) {
         let witness = |omega: Option<f32>, sigma: Option<f32>| {
@@ -97,7 +116,9 @@ impl Measurement {
         // Parts that differ may be miscounted: at least one blade passes in a turn.
         let parts = self.parts.filter(|_| self.alike).unwrap_or(1);
         let passes = f32::from(parts) * self.omega_rad_s.abs() * window_s / TAU;
-        let held_up = QUEUE_SIGMA * stretch(window, self.disc, passes);
+        let held = held(window, self.disc, passes, self.filling);
+        let held_up = QUEUE_SIGMA * held.stretch;
+        self.filled = held.filled;
         // What jitter leads astray says nothing, nor does what agrees with anything.
         let lock = lock.filter(|lock| {
             !self.is_vague(*lock)
