@@ -47,6 +47,8 @@ const MOST_UNSEEN: f32 = 0.25;
 /// What a readout that was busy does to a window.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Held {
+    /// Share of its time by which all its events may be late.
+    pub late: f32,
     /// Share by which its time may be stretched as a rotor's speed is read.
     pub stretch: f32,
     /// Whether the queue is seen to fill as the window begins, so that the rotor is out of step there.
@@ -112,7 +114,7 @@ pub fn held(window: &Window<'_>, disc: Disc, passes: f32, seen: Filled) -> Held 
     }
     let whole = QUEUE_EVENTS / larger(arrived, QUEUE_EVENTS);
     if busy == Busy::ForAWhile {
-        return Held { stretch: STEP * whole, filled: false };
+        return Held { late: whole, stretch: STEP * whole, filled: false };
     }
     let [off, on] = of_rotor;
     let passed = core::f32::consts::PI * disc.radius_px * disc.radius_px * passes;
@@ -124,7 +126,7 @@ pub fn held(window: &Window<'_>, disc: Disc, passes: f32, seen: Filled) -> Held 
     let filled = unseen < MOST_UNSEEN * whole;
     let stretch = if filled { FOUND * seen.tilt.abs() + unseen } else { whole };
     let stretch = if came < MOST_CAME { stretch.min(TILT * took * whole) } else { stretch };
-    Held { stretch, filled }
+    Held { late: whole, stretch, filled }
 }
 
 /// Variance of the time that a group of events takes over that of a Poisson process, times the degrees of freedom, and these: of the

@@ -117,7 +117,9 @@ impl Measurement {
         let parts = self.parts.filter(|_| self.alike).unwrap_or(1);
         let passes = f32::from(parts) * self.omega_rad_s.abs() * window_s / TAU;
         let held = held(window, self.disc, passes, self.filling);
-        let held_up = QUEUE_SIGMA * held.stretch;
+        // Of late events, the speed is that of as long before.
+        let changed = self.alpha_rad_s2.unwrap_or(0.0) * window_s * held.late / self.omega_rad_s;
+        let held_up = QUEUE_SIGMA * (held.stretch + changed.abs());
         self.filled = held.filled;
         // What jitter leads astray says nothing, nor does what agrees with anything.
         let lock = lock.filter(|lock| {
