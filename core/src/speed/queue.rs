@@ -121,11 +121,12 @@ pub fn held(window: &Window<'_>, disc: Disc, passes: f32, seen: Filled) -> Held 
     // Of so many that the pixels sent, these came: what is lost beside one that comes fills the queue, or would.
     let came = larger(off, on) / larger(LEAST_LEFT * passed, larger(off, on));
     let took = whole * came / larger(1.0 - came, f32::MIN_POSITIVE);
-    // What is not seen to have filled may fill unseen, evenly through all of the window.
-    let unseen = (whole - seen.early).abs();
-    let filled = unseen < MOST_UNSEEN * whole;
-    let stretch = if filled { FOUND * seen.tilt.abs() + unseen } else { whole };
-    let stretch = if came < MOST_CAME { stretch.min(TILT * took * whole) } else { stretch };
+    // What is not seen to have filled may fill unseen, evenly through all of the window; but no more than what is lost leaves room for.
+    let left = (whole - seen.early).abs();
+    let filled = left < MOST_UNSEEN * whole;
+    let unseen = if filled { left } else { whole };
+    let unseen = if came < MOST_CAME { unseen.min(TILT * took * whole) } else { unseen };
+    let stretch = if filled { FOUND * seen.tilt.abs() + unseen } else { unseen };
     Held { late: whole, stretch, filled }
 }
 

@@ -3,7 +3,7 @@
 use super::super::baseline::Estimate;
 use super::baselines::FRACTION;
 use super::{ACCELERATION_SIGMAS, Measurement, Stage, Stated};
-use crate::math::{TAU, sqrt};
+use crate::math::{TAU, larger, sqrt};
 use crate::reading::{Evidence, Reason, Status};
 use crate::speed::angular::AngularSums;
 use crate::speed::filling::Filling;
@@ -119,7 +119,10 @@ impl Measurement {
         let held = held(window, self.disc, passes, self.filling);
         // Of late events, the speed is that of as long before.
         let changed = self.alpha_rad_s2.unwrap_or(0.0) * window_s * held.late / self.omega_rad_s;
-        let held_up = QUEUE_SIGMA * (held.stretch + changed.abs());
+        // Where its path goes astray as the queue fills, the speed seems to swing.
+        let swing_rad_s = self.evidence.swing_rad_s.filter(|_| held.late > 0.0).unwrap_or(0.0);
+        let stretch = larger(held.stretch, swing_rad_s / self.omega_rad_s.abs());
+        let held_up = QUEUE_SIGMA * (stretch + changed.abs());
         self.filled = held.filled;
         // What jitter leads astray says nothing, nor does what agrees with anything.
         let lock = lock.filter(|lock| {
