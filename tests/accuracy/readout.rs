@@ -16,21 +16,19 @@ const LARGEST_SIGMA_PERMILLE: f64 = 1.0;
 const DURATION_MS: f64 = 200.0;
 
 /// The scene with a readout that keeps up with such a share of its events, and holds so many.
-fn scene(share: Option<f64>, readout_queue: u32) -> Scene {
+fn scene(share: f64, readout_queue: u32) -> Scene {
     let rotor = Rotor { blades: 3, rpm: RPM, ..Rotor::default() };
     let mut scene =
         Scene { seed: 23, duration_ms: DURATION_MS, rotors: vec![rotor], ..Scene::default() };
-    if let Some(share) = share {
-        let all = made(&scene).events.len() as f64;
-        scene.sensor.readout_mev_s = Some(share * all / (1e3 * DURATION_MS));
-        scene.sensor.readout_queue = readout_queue;
-    }
+    let all = made(&scene).events.len() as f64;
+    scene.sensor.readout_mev_s = Some(share * all / (1e3 * DURATION_MS));
+    scene.sensor.readout_queue = readout_queue;
     scene
 }
 
 /// Standard errors in permille of all speeds that are told; all of them are right.
 fn sigmas_permille(share: f64, queue: u32, capacity: Capacity) -> Vec<f64> {
-    let scene = scene(Some(share), queue);
+    let scene = scene(share, queue);
     let geometry = Geometry::new(scene.width_px, scene.height_px).expect("a sensor in range");
     let events = generate(&scene).expect("a scene in range").events;
     let (readings, _) = measure(&Loaded { geometry, events }, capacity);

@@ -76,6 +76,7 @@ pub struct Bench {
     angular: AngularSums,
     /// How the events of the window are gone through.
     even: Even,
+    /// How a readout's queue filled, as far as the window was asked.
     filling: Filling,
 }
 

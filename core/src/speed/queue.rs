@@ -124,10 +124,9 @@ pub fn held(window: &Window<'_>, disc: Disc, passes: f32, seen: Filled) -> Held 
     // What is not seen to have filled may fill unseen, evenly through all of the window; but no more than what is lost leaves room for.
     let left = (whole - seen.early).abs();
     let filled = left < MOST_UNSEEN * whole;
-    let unseen = if filled { left } else { whole };
+    let (unseen, found) = if filled { (left, FOUND * seen.tilt.abs()) } else { (whole, 0.0) };
     let unseen = if came < MOST_CAME { unseen.min(TILT * took * whole) } else { unseen };
-    let stretch = if filled { FOUND * seen.tilt.abs() + unseen } else { unseen };
-    Held { late: whole, stretch, filled }
+    Held { late: whole, stretch: found + unseen, filled }
 }
 
 /// Variance of the time that a group of events takes over that of a Poisson process, times the degrees of freedom, and these: of the
