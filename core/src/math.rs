@@ -12,10 +12,17 @@
 /// Full circle in radians.
 pub const TAU: f32 = core::f32::consts::TAU;
 
-/// Square root, correctly rounded.
+/// Square root, to one unit in the last place: in half the time of libm's, which finds it bit by bit.
 #[must_use]
+// Not inlined: flash is short.
+#[inline(never)]
 pub fn sqrt(x: f32) -> f32 {
-    libm::sqrtf(x)
+    if x > 0.0 && x <= f32::MAX {
+        let nearly = quick_sqrt(x);
+        0.5 * (nearly + x / nearly)
+    } else {
+        libm::sqrtf(x)
+    }
 }
 
 /// The nearest whole number, halves away from zero; of what is below 2^31.
@@ -52,12 +59,13 @@ pub fn ln(x: f32) -> f32 {
     libm::logf(x)
 }
 
-/// Square root of what is not negative to a relative 1e-5, in a sixth of the time.
+/// Square root of what is not negative to a relative 1e-5, in a sixth of libm's time.
 #[must_use]
-pub fn quick_sqrt(x: f32) -> f32 {
-    // Heron's steps square the error of 6 %. The rough root of 0 is above 0.
-    let once = rough::sqrt(x);
-    let once = 0.5 * (once + x / once);
+pub const fn quick_sqrt(x: f32) -> f32 {
+    // That of micromath, which asks for the sign first: half the exponent, to 6 %. That of 0 is above 0.
+    let rough = f32::from_bits(x.to_bits().wrapping_add(0x3F80_0000) >> 1);
+    // Heron's steps square the error.
+    let once = 0.5 * (rough + x / rough);
     0.5 * (once + x / once)
 }
 
@@ -269,6 +277,17 @@ mod tests {
                 assert_eq!(floor(x), libm::floorf(x), "{x}");
             }
         }
+    }
+
+    #[test]
+    fn square_root_is_right_to_one_unit_in_the_last_place() {
+        for i in -100_000..100_000 {
+            let x = 1.000_8_f32.powi(i);
+            let (below, above) = (libm::sqrtf(x).next_down(), libm::sqrtf(x).next_up());
+            assert!((below..=above).contains(&sqrt(x)), "{x}");
+        }
+        assert_eq!([0.0, f32::INFINITY].map(sqrt), [0.0, f32::INFINITY]);
+        assert!(sqrt(-1.0).is_nan() && sqrt(f32::NAN).is_nan());
     }
 
     #[test]
