@@ -96,8 +96,10 @@ impl Trend {
         let points = Points { points, fold: fold.max(1) };
         let used = points.points.iter().filter(|p| p.weight > 0.0).count();
         let mut rest: Values = [0.0; MOST_POINTS];
-        for (value, point) in rest.iter_mut().zip(points.points) {
-            *value = point.y;
+        // Legendre's polynomials at the points, of the degree before and of this one, by their recurrence.
+        let mut legendre = [(1.0_f32, 0.0_f32); MOST_POINTS];
+        for ((value, (_, here)), point) in rest.iter_mut().zip(&mut legendre).zip(points.points) {
+            (*value, *here) = (point.y, point.u);
         }
         let free = used.checked_sub(points.take_offsets(&mut rest))?;
         let mut basis = [[0.0_f32; MOST_POINTS]; MOST_DEGREE];
@@ -108,8 +110,13 @@ impl Trend {
             let index = degree - 1;
             let (before, after) = basis.split_at_mut(index);
             let values = &mut after[0];
-            for (value, point) in values.iter_mut().zip(points.points) {
-                *value = legendre(degree, point.u);
+            let k = degree as f32;
+            for ((value, point), (before, here)) in
+                values.iter_mut().zip(points.points).zip(&mut legendre)
+            {
+                *value = *here;
+                let next = ((2.0 * k + 1.0) * point.u * *here - k * *before) / (k + 1.0);
+                (*before, *here) = (*here, next);
             }
             points.take_offsets(values);
             let whole = points.product(values, values);
@@ -220,16 +227,6 @@ fn shrunk(terms: (&[f32], &[f32]), squares: f32, free: usize, size: f32) -> (f32
         degrees_of_freedom: (free as f32 - taken) as usize,
     };
     (cost + n * ln(sum.max(f32::MIN_POSITIVE)), found)
-}
-
-/// Legendre's polynomial.
-fn legendre(degree: usize, u: f32) -> f32 {
-    let (mut before, mut here) = (1.0, u);
-    for k in 1..degree {
-        let k = k as f32;
-        (before, here) = (here, ((2.0 * k + 1.0) * u * here - k * before) / (k + 1.0));
-    }
-    here
 }
 
 #[cfg(test)]
