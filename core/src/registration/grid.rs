@@ -147,24 +147,21 @@ impl Grid {
         let across_px = (2 * ring - 1) as f32 * self.cell_px;
         let (right_px, below_px) = (across_px - left_px, across_px - above_px);
         let (left, right) = (column.checked_sub(ring), column + ring);
-        let columns = (left.unwrap_or(0), right.min(SIDE - 1));
         let (above, below) = (row.checked_sub(ring), row + ring);
-        if let Some(above) = above
-            && may_be_nearer(above_px, *best)
-        {
-            self.visit(query, bank + above, columns, best);
-        }
-        let rows = above.map_or(0, |above| above + 1)..below.min(SIDE);
-        if let Some(left) = left
-            && may_be_nearer(left_px, *best)
-        {
-            rows.clone().for_each(|row| self.visit(query, bank + row, (left, left), best));
-        }
-        if right < SIDE && may_be_nearer(right_px, *best) {
-            rows.for_each(|row| self.visit(query, bank + row, (right, right), best));
-        }
-        if below < SIDE && may_be_nearer(below_px, *best) {
-            self.visit(query, bank + below, columns, best);
+        let (first, last) = (left.unwrap_or(0), right.min(SIDE - 1));
+        let between = above.map_or(0, |above| above + 1)..below.min(SIDE);
+        let sides = [
+            (above_px, above.map(|above| (above..above + 1, first, last))),
+            (left_px, left.map(|left| (between.clone(), left, left))),
+            (right_px, (right < SIDE).then(|| (between, right, right))),
+            (below_px, (below < SIDE).then(|| (below..below + 1, first, last))),
+        ];
+        for (apart_px, side) in sides {
+            if let Some((rows, from, to)) = side
+                && may_be_nearer(apart_px, *best)
+            {
+                rows.for_each(|row| self.visit(query, bank + row, (from, to), best));
+            }
         }
     }
 
