@@ -15,6 +15,8 @@ const LOOK_US: u32 = 100;
 const LEAST_LOOKS: u32 = 12;
 /// The closest two of n times at random are the span over n^2 apart; so many times that are no chance: seven in a thousand.
 const BEYOND_CHANCE: f32 = 5.0;
+/// Of more lines that are looked at sooner, the rest are not nearly all.
+const MOST_SOONER: u32 = LINES as u32 / 4;
 
 /// The looks at one row or column.
 #[derive(Clone, Copy)]
@@ -24,59 +26,68 @@ struct Line {
     closest_us: u32,
 }
 
-/// Time between two looks of the sensor at a row or column of a rotor, or at all of its pixels, in microseconds, whichever is longest; 0 where it looks whenever
-/// there is something to see. Cost: one pass over the window, some 30 instructions an event.
+impl Line {
+    /// Whether it can be judged, and is looked at again after so long a time or sooner.
+    fn is_sooner(&self, most_us: f32) -> bool {
+        self.looks >= LEAST_LOOKS && self.closest_us as f32 <= most_us
+    }
+}
+
+/// Whether the sensor looks at each row or column of a rotor, or at all of its pixels at once, only every so often, and that longer apart
+/// than `most_us`. Cost: some 30 instructions an event, until most is known to be looked at sooner.
 #[must_use]
-pub fn look_us(window: &Window<'_>, disc: Disc) -> u32 {
+pub fn looks_seldom(window: &Window<'_>, disc: Disc, most_us: f32) -> bool {
     let never = Line { looks: 0, last_us: 0, closest_us: u32::MAX };
     let (mut columns, mut rows, mut all) = ([never; LINES], [never; LINES], [never]);
     let half = LINES as u16 / 2;
     let x = (disc.x_px as u16).wrapping_sub(half);
     let y = (disc.y_px as u16).wrapping_sub(half);
-    for event in window.events() {
-        let t_us = event.since(window.start_us).unsigned_abs();
-        let (column, row) = (event.x().wrapping_sub(x), event.y().wrapping_sub(y));
-        if usize::from(column) < LINES {
-            look(&mut columns, column, t_us);
+    let (mut sooner_columns, mut sooner_rows, mut sooner) = (0, 0, 0);
+    for segment in 0..window.segments() {
+        for event in window.segment(segment) {
+            let t_us = event.since(window.start_us).unsigned_abs();
+            let (column, row) = (event.x().wrapping_sub(x), event.y().wrapping_sub(y));
+            sooner_columns += look(&mut columns, column, t_us, most_us);
+            sooner_rows += look(&mut rows, row, t_us, most_us);
+            sooner += look(&mut all, 0, t_us, most_us);
+            if sooner > 0 && sooner_columns > MOST_SOONER && sooner_rows > MOST_SOONER {
+                return false;
+            }
         }
-        if usize::from(row) < LINES {
-            look(&mut rows, row, t_us);
-        }
-        look(&mut all, 0, t_us);
     }
-    regular_us(&columns, window).max(regular_us(&rows, window)).max(regular_us(&all, window))
+    [&columns[..], &rows, &all].iter().any(|lines| is_regular(lines, window, most_us))
 }
 
-/// Takes in an event of a line, if it is of one of these.
+/// Takes in an event of a line, if it is of one of these; 1 where that shows the line to be looked at sooner, else 0.
 // Not inlined: flash is short.
 #[inline(never)]
-fn look(lines: &mut [Line], line: u16, t_us: u32) {
-    let Some(line) = lines.get_mut(usize::from(line)) else { return };
+fn look(lines: &mut [Line], line: u16, t_us: u32, most_us: f32) -> u32 {
+    let Some(line) = lines.get_mut(usize::from(line)) else { return 0 };
     let since_us = t_us.wrapping_sub(line.last_us);
+    if line.looks > 0 && since_us < LOOK_US {
+        return 0;
+    }
+    let was_sooner = line.is_sooner(most_us);
     if line.looks > 0 {
-        if since_us < LOOK_US {
-            return;
-        }
         line.closest_us = line.closest_us.min(since_us);
     }
     line.looks += 1;
     line.last_us = t_us;
+    u32::from(!was_sooner && line.is_sooner(most_us))
 }
 
-/// The shortest distance of the looks at nearly all lines, of which half can be judged, where that is no chance.
+/// Whether nearly all lines, of which half can be judged, have a shortest distance between looks that is no chance, and longer.
 // Not inlined: flash is short.
 #[inline(never)]
-fn regular_us(lines: &[Line], window: &Window<'_>) -> u32 {
-    let (mut judged, mut regular, mut closest_us) = (0, 0, u32::MAX);
-    for line in lines {
-        let looks = line.looks as f32;
-        judged += u32::from(line.looks >= LEAST_LOOKS);
-        if line.looks >= LEAST_LOOKS
-            && line.closest_us as f32 * looks * looks > BEYOND_CHANCE * window.duration_us as f32
-        {
+fn is_regular(lines: &[Line], window: &Window<'_>, most_us: f32) -> bool {
+    let (mut judged, mut regular, mut sooner) = (0, 0, false);
+    for line in lines.iter().filter(|line| line.looks >= LEAST_LOOKS) {
+        judged += 1;
+        let (looks, closest_us) = (line.looks as f32, line.closest_us as f32);
+        if closest_us * looks * looks > BEYOND_CHANCE * window.duration_us as f32 {
             regular += 1;
-            closest_us = closest_us.min(line.closest_us);
+            sooner |= line.is_sooner(most_us);
         }
     }
-    if 2 * judged >= lines.len() as u32 && 4 * regular >= 3 * judged { closest_us } else { 0 }
+    2 * judged >= lines.len() && 4 * regular >= 3 * judged && !sooner
 }

@@ -104,12 +104,14 @@ pub fn held(window: &Window<'_>, disc: Disc, passes: f32, seen: Filled) -> Held 
         return Held::default();
     }
     let (mut arrived, mut of_rotor) = (0.0, [0.0_f32; 2]);
-    for event in window.events() {
-        let stands_for = f32::from(1_u16 << event.weight_log2());
-        let at = Disc { x_px: event.x().into(), y_px: event.y().into(), radius_px: 0.0 };
-        arrived += stands_for;
-        if disc.distance2(&at) < disc.radius_px * disc.radius_px {
-            of_rotor[usize::from(window.is_on(event))] += stands_for;
+    for segment in 0..window.segments() {
+        for event in window.segment(segment) {
+            let stands_for = f32::from(1_u16 << event.weight_log2());
+            let at = Disc { x_px: event.x().into(), y_px: event.y().into(), radius_px: 0.0 };
+            arrived += stands_for;
+            if disc.distance2(&at) < disc.radius_px * disc.radius_px {
+                of_rotor[usize::from(window.is_on(*event))] += stands_for;
+            }
         }
     }
     let whole = QUEUE_EVENTS / larger(arrived, QUEUE_EVENTS);

@@ -7,7 +7,7 @@ use crate::math::{TAU, larger, sqrt};
 use crate::reading::{Evidence, Reason, Status};
 use crate::speed::angular::AngularSums;
 use crate::speed::filling::Filling;
-use crate::speed::folding::look_us;
+use crate::speed::folding::looks_seldom;
 use crate::speed::queue::{Busy, busy, held};
 use crate::speed::statistics::root_sum_square;
 use crate::store::Window;
@@ -227,7 +227,7 @@ impl Measurement {
     fn is_folded(&self, window: &Window<'_>) -> bool {
         let windings = self.parts.filter(|_| self.alike).map_or(self.windings, u32::from);
         let passes_hz = windings as f32 * self.omega_rad_s.abs() / TAU;
-        passes_hz > SLOW_HZ && 2e-6 * passes_hz * look_us(window, self.disc) as f32 > 1.0
+        passes_hz > SLOW_HZ && looks_seldom(window, self.disc, 0.5e6 / passes_hz)
     }
 
     /// Whether the lock bears the phase out, and the rotor is where it should be between whole periods.
