@@ -44,6 +44,9 @@ pub struct Settings {
     /// One standard deviation of the gyro's zero-rate offset in rad/s, as far as it is known before it is heard: it is found
     /// while measuring.
     pub gyro_sigma_rad_s: f32,
+    /// Whether the paper's further refinement is measured, too, which no speed needs: for comparison with the paper. No other result
+    /// depends on it.
+    pub all_stages: bool,
 }
 
 /// Standard deviation of the zero-rate offset in rad/s of a gyro that nobody calibrated: within 20 degrees a second (data sheet of the
@@ -61,6 +64,7 @@ impl Settings {
             window_us: None,
             clock_sigma_ppm: 15.0,
             gyro_sigma_rad_s: UNCALIBRATED_RAD_S,
+            all_stages: false,
         }
     }
 }

@@ -155,6 +155,20 @@ fn a_shift_in_time_changes_no_bit() {
 }
 
 #[test]
+fn what_no_speed_needs_changes_no_bit() {
+    for (events, capacity) in cases() {
+        let settings = settings(WIDTH_PX, HEIGHT_PX);
+        let (needed, _) = measure_events(&events, &[], settings, capacity);
+        let all = Settings { all_stages: true, ..settings };
+        let (mut readings, _) = measure_events(&events, &[], all, capacity);
+        let evidence = readings.iter_mut().flat_map(|r| &mut r.rotors).map(|r| &mut r.evidence);
+        let further = evidence.filter_map(|evidence| evidence.further_rad_s.take()).count();
+        assert!(further > 0, "{capacity:?}");
+        assert_eq!(format!("{readings:?}"), format!("{needed:?}"), "{capacity:?}");
+    }
+}
+
+#[test]
 fn half_of_the_events_say_the_same() {
     for (events, capacity) in cases() {
         let half: Vec<Event> = events.iter().copied().step_by(2).collect();

@@ -20,6 +20,7 @@ use crate::math::TAU;
 use crate::reading::{Evidence, Frame, Reason, Speed, Status};
 use crate::registration::Icp;
 use crate::rotors::{Disc, Found};
+use crate::settings::Settings;
 use crate::store::{Even, Window};
 use doubt::Doubt;
 
@@ -34,15 +35,8 @@ const LEAST_EVENTS: usize = 200;
 /// Symmetry periods and revolutions that a lock needs in the window.
 const LOCK_PERIODS: f32 = 3.0;
 const LOCK_REVOLUTIONS: f32 = 2.0;
-
-/// What the person stated.
-#[derive(Clone, Copy, Debug)]
-pub struct Stated {
-    /// Blade count, when given.
-    pub blades: Option<u8>,
-    /// One standard deviation of the clock's error in ppm.
-    pub clock_sigma_ppm: f32,
-}
+/// A window may be as much shorter than what is wanted.
+pub const ENOUGH: f32 = 1.02;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Stage {
@@ -52,6 +46,7 @@ enum Stage {
     Newton,
     Scan,
     Doubt,
+    Arc,
     Symmetry,
     Overtone,
     Recovery,
@@ -199,7 +194,7 @@ impl Measurement {
     pub fn step(
         &mut self,
         window: &Window<'_>,
-        stated: &Stated,
+        settings: &Settings,
         polar: &mut PolarTrack,
         bench: &mut Bench,
     ) -> bool {
@@ -209,18 +204,19 @@ impl Measurement {
             Stage::Newton => self.newton(window, polar),
             Stage::Scan => self.scan(polar, angular),
             Stage::Doubt => self.doubt(window, polar, angular, even),
-            Stage::Symmetry => self.symmetry(stated, polar, angular),
+            Stage::Arc => self.arc(polar),
+            Stage::Symmetry => self.symmetry(settings, polar, angular),
             Stage::Overtone => self.overtone(polar, angular),
             Stage::Recovery => self.recovery(window, polar),
             Stage::Pose => self.pose(window, sums, walked, even),
             Stage::Initial => self.initial(window, icp),
-            Stage::Refinement => self.refinement(window, icp),
+            Stage::Refinement => self.refinement(window, settings, icp),
             Stage::Further => self.further(window, icp),
             Stage::Lock => self.lock(window, icp),
             Stage::Fractional => self.fractional(window, icp),
             Stage::Queue => self.queue(window, filling, angular),
             Stage::Verdict => {
-                self.verdict(window, stated);
+                self.verdict(window, settings);
                 self.stage = Stage::Done;
             }
             Stage::Done => {}
@@ -233,7 +229,7 @@ impl Measurement {
     pub const fn stage(&self) -> &'static str {
         match self.stage {
             Stage::Track | Stage::Newton => "centre",
-            Stage::Scan | Stage::Doubt => "scan",
+            Stage::Scan | Stage::Doubt | Stage::Arc => "scan",
             Stage::Symmetry | Stage::Overtone => "symmetry",
             Stage::Recovery => "recovery",
             Stage::Pose => "pose",

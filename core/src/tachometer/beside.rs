@@ -4,10 +4,10 @@
 //! one that is. So where all that was found is locked and a patch of the picture beside it is dense with events, the window
 //! grows once, in two steps up to the longest, and then begins short again if nothing in it wanted that.
 
-use super::conclude::{ENOUGH, Wants};
+use super::conclude::Wants;
 use super::{Beside, Tachometer};
 use crate::rotors::Disc;
-use crate::speed::measurement::Outcome;
+use crate::speed::measurement::{ENOUGH, Outcome};
 
 /// Of so many cells one is asked for the mean.
 const SAMPLED: usize = 7;

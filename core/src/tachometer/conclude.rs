@@ -10,7 +10,7 @@ use crate::order::sort_few;
 use crate::reading::{Evidence, Frame, Reading, Reason, RotorReading, Status};
 use crate::rotors::Disc;
 use crate::rotors::extraction::InStep;
-use crate::speed::measurement::Outcome;
+use crate::speed::measurement::{ENOUGH, Outcome};
 use crate::store::{Account, WINDOW_SEGMENTS};
 
 /// Windows that an adapting window steps through.
@@ -25,8 +25,6 @@ const WINDOWS_US: [u32; 9] = [
     1_600_000,
     LONGEST_WINDOW_US,
 ];
-/// A window may be as much shorter than what is wanted.
-pub(super) const ENOUGH: f32 = 1.02;
 /// Readings until the whole image is searched again, while a rotor is in view that is not locked.
 const SEARCH_AGAIN: u8 = 2;
 /// Fewest events in a window that are looked at.

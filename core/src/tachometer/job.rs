@@ -9,7 +9,7 @@ use crate::reading::{Reason, Status};
 use crate::rotors::extraction::{Extraction, View};
 use crate::rotors::{Disc, Found, Visits};
 use crate::settings::Poll;
-use crate::speed::measurement::{Measurement, Outcome, Stated};
+use crate::speed::measurement::{Measurement, Outcome};
 use crate::tracker::Known;
 
 impl Tachometer<'_> {
@@ -137,17 +137,13 @@ impl Tachometer<'_> {
             }
             Job::Measure(index, measurement) => {
                 let Scratch::Measure(bench) = self.scratch else { return true };
-                let stated = Stated {
-                    blades: self.settings.blades,
-                    clock_sigma_ppm: self.settings.clock_sigma_ppm,
-                };
                 let polar = match &mut self.more {
                     Some(more) => &mut *more.track,
                     None => self.polar.as_mut_view(),
                 };
                 let Some(candidate) = self.candidates.get(*index) else { return true };
                 window.ignores_polarity = candidate.found.ignores_polarity;
-                if !measurement.step(&window, &stated, polar, bench) {
+                if !measurement.step(&window, &self.settings, polar, bench) {
                     return false;
                 }
                 let (index, mut outcome) = (*index, measurement.result());

@@ -59,10 +59,12 @@ pub struct Measured {
 }
 
 impl How {
-    /// Measures a recording, and says on stderr what is to be known of it. `seen` is handed the events that are measured.
+    /// Measures a recording, and says on stderr what is to be known of it. `all_stages`: those, too, that no speed needs. `seen` is
+    /// handed the events that are measured.
     pub fn measure(
         &self,
         file: &Path,
+        all_stages: bool,
         mut seen: impl FnMut(&[Event], &Timeline),
     ) -> anyhow::Result<Measured> {
         let name = file.display().to_string();
@@ -72,7 +74,7 @@ impl How {
             eprintln!("{name}: {assumed}");
         }
         let plan = Plan {
-            settings: self.settings(recording.geometry),
+            settings: Settings { all_stages, ..self.settings(recording.geometry) },
             capacity: self.capacity,
             takes_gyro: self.gyro,
             since_us: self.span.since_us(),

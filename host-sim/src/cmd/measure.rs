@@ -43,7 +43,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 /// Measures one file; whether it has a speed.
 fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
-    let Measured { plan, facts, readings, summary, .. } = args.how.measure(file, |_, _| ())?;
+    let measured = args.how.measure(file, args.verbose, |_, _| ())?;
+    let Measured { plan, facts, readings, summary, .. } = measured;
     if args.json {
         let document = Document::new(&plan, &facts, &summary, &readings);
         say(format!("{}\n", serde_json::to_string(&document)?))?;

@@ -38,7 +38,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         _ => bail!("{}: a report is HTML or SVG; end its name in .html or .svg", out.display()),
     };
     let mut events: Vec<Event> = Vec::new();
-    let measured = args.how.measure(&args.file, |more, timeline| {
+    let measured = args.how.measure(&args.file, false, |more, timeline| {
         events.extend(more.iter().map(|event| timeline.laid_event(event)));
     })?;
     let subject = Subject {

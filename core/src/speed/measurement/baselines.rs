@@ -7,6 +7,7 @@ use super::{Measurement, Stage};
 use crate::limits::SLICE_POINTS;
 use crate::reading::Reason;
 use crate::registration::Icp;
+use crate::settings::Settings;
 use crate::speed::pose::Slope;
 use crate::store::Window;
 
@@ -23,7 +24,7 @@ const FRACTIONAL: Effort = Effort { pairs: 3, ..LOCK };
 /// The same where these few deviate: scatter goes, an alias stays.
 const FRACTIONAL_AGAIN: Effort = Effort { pairs: 9, ..LOCK };
 /// The lock of a rotor that is followed: the phase tells its speed, and these bear it out, for which they need not settle as far.
-const FOLLOWING: Effort = Effort { pairs: 3, points: 3 * SLICE_POINTS / 8, settled: 0.5 };
+const FOLLOWING: Effort = Effort { pairs: 3, points: 3 * SLICE_POINTS / 8, settled: 0.7 };
 /// An alias is off by ten times what a pair of few points scatters by.
 const FRACTIONAL_FOLLOWING: Effort = Effort { pairs: 1, points: SLICE_POINTS / 4, settled: 1.0 };
 /// Where there are more events than this for each pair, more pairs are registered, up to [`crate::limits::MAX_PAIRS`].
@@ -110,7 +111,7 @@ impl Measurement {
     }
 
     /// The paper's refinement: step extended to 0.8 of half an angle of symmetry.
-    pub(super) fn refinement(&mut self, window: &Window<'_>, icp: &mut Icp) {
+    pub(super) fn refinement(&mut self, window: &Window<'_>, settings: &Settings, icp: &mut Icp) {
         let Some(pairs) = self.advance(window, icp) else { return };
         let Some(refined) = pairs.middle() else {
             self.stage = Stage::Queue;
@@ -124,6 +125,9 @@ impl Measurement {
             }
             self.stage = Stage::Queue;
             return;
+        }
+        if !settings.all_stages {
+            return self.begin_lock(window, refined);
         }
         self.plan(window, REFINEMENT_PERIODS, self.worth(FURTHER, PAIR_EVENTS));
         if let Some(pairs) = &mut self.pairs {
@@ -145,13 +149,18 @@ impl Measurement {
     /// The paper's further refinement, kept to show what it gains.
     pub(super) fn further(&mut self, window: &Window<'_>, icp: &mut Icp) {
         let Some(pairs) = self.advance(window, icp) else { return };
-        let found = pairs.middle();
-        self.evidence.further_rad_s = found.map(|found| found.omega_rad_s);
-        let sigma = found.map_or(f32::MAX, |found| {
-            found.sigma_rad_s.max((found.omega_rad_s - self.omega_rad_s).abs())
-        });
+        self.evidence.further_rad_s = pairs.middle().map(|found| found.omega_rad_s);
+        let omega_rad_s = self.evidence.refined_rad_s.unwrap_or(self.omega_rad_s);
+        let sigma_rad_s = self.evidence.refined_sigma_rad_s.unwrap_or(f32::MAX);
+        self.begin_lock(window, Estimate { omega_rad_s, sigma_rad_s });
+    }
+
+    /// Plans the first step of the lock of a rotor whose speed is as sure as refinement says.
+    fn begin_lock(&mut self, window: &Window<'_>, refined: Estimate) {
+        let off_rad_s = (refined.omega_rad_s - self.omega_rad_s).abs();
         let whole = self.omega_rad_s.abs();
-        self.plan_lock(window, sigma.max(LEAST_START * whole).min(MOST_START * whole));
+        let sigma = refined.sigma_rad_s.max(off_rad_s).max(LEAST_START * whole);
+        self.plan_lock(window, sigma.min(MOST_START * whole));
         self.stage = Stage::Lock;
     }
 

@@ -3,10 +3,11 @@
 
 use super::baselines::REFINEMENT_PERIODS;
 use super::doubt::Doubt;
-use super::{LEAST_EVENTS, Measurement, Stage, Stated};
+use super::{LEAST_EVENTS, Measurement, Stage};
 use crate::math::TAU;
 use crate::reading::{Reason, Speed, Status};
 use crate::registration::Icp;
+use crate::settings::Settings;
 use crate::speed::angular::AngularSums;
 use crate::speed::baseline::Estimate;
 use crate::speed::initial::{Ladder, median};
@@ -116,10 +117,7 @@ impl Measurement {
             self.stage = Stage::Track;
             return;
         }
-        // What shows on less than half of its way around may be part of something larger.
-        let on_arc = rival > RIVAL_OF_ARC
-            && Pattern::is_arc(polar, self.disc, self.omega_rad_s, self.harmonic);
-        if standing > MOST_STANDING || on_arc {
+        if standing > MOST_STANDING {
             return self.refuse(Reason::Ambiguous);
         }
         if TAU * self.disc.radius_px < LEAST_APART_PX * self.harmonic as f32 {
@@ -128,13 +126,21 @@ impl Measurement {
         self.other_windings =
             [scan.still_share, scan.mirror_share].map(|share| share / scan.share.max(1e-3));
         self.windings = self.harmonic;
+        self.stage = if rival > RIVAL_OF_ARC { Stage::Arc } else { Stage::Symmetry };
+    }
+
+    /// Whether it shows on less than half of its way around: then it may be part of something larger.
+    pub(super) fn arc(&mut self, polar: &[PolarEvent]) {
+        if Pattern::is_arc(polar, self.disc, self.omega_rad_s, self.harmonic) {
+            return self.refuse(Reason::Ambiguous);
+        }
         self.stage = Stage::Symmetry;
     }
 
     /// Angle of symmetry, some events a step.
     pub(super) fn symmetry(
         &mut self,
-        stated: &Stated,
+        settings: &Settings,
         polar: &[PolarEvent],
         angular: &mut AngularSums,
     ) {
@@ -149,10 +155,10 @@ impl Measurement {
             return;
         }
         let symmetry = symmetry(angular);
-        self.parts = stated.blades.or(symmetry.parts);
+        self.parts = settings.blades.or(symmetry.parts);
         // What was not counted is many parts, unless they are as little alike as the edges of one.
         let least = if self.parts.is_some() { ALIKE_SCORE } else { LEAST_ALIKE };
-        self.alike = self.parts == Some(1) || stated.blades.is_none() && symmetry.score >= least;
+        self.alike = self.parts == Some(1) || settings.blades.is_none() && symmetry.score >= least;
         self.evidence.symmetry_score = Some(symmetry.score);
         self.stage = Stage::Overtone;
     }
@@ -215,7 +221,7 @@ impl Measurement {
             return self.refuse(Reason::Ambiguous);
         }
         let periods = self.count_periods(window);
-        if periods < COARSE_PERIODS {
+        if periods < COARSE_PERIODS || self.is_mark_too_slow(window) {
             return self.refuse(Reason::TooSlow);
         }
         // Until something better: as good as the share of a period that the window shows.

@@ -2,9 +2,10 @@
 
 use super::super::baseline::Estimate;
 use super::baselines::FRACTION;
-use super::{ACCELERATION_SIGMAS, Measurement, Stage, Stated};
+use super::{ACCELERATION_SIGMAS, ENOUGH, Measurement, Stage};
 use crate::math::{TAU, larger, sqrt};
 use crate::reading::{Evidence, Reason, Status};
+use crate::settings::Settings;
 use crate::speed::angular::AngularSums;
 use crate::speed::filling::Filling;
 use crate::speed::folding::looks_seldom;
@@ -103,7 +104,7 @@ impl Measurement {
     }
 
     /// Combines the witnesses of the lock, or says why the reading stays coarse.
-    pub(super) fn verdict(&mut self, window: &Window<'_>, stated: &Stated) {
+    pub(super) fn verdict(&mut self, window: &Window<'_>, settings: &Settings) {
         let witness = |omega: Option<f32>, sigma: Option<f32>| {
             Some(Estimate { omega_rad_s: omega?, sigma_rad_s: sigma? })
         };
@@ -140,7 +141,7 @@ impl Measurement {
             let both = combine(witness, phase, 1.0);
             let sharp = both.sigma_rad_s.max(held_up * both.omega_rad_s.abs())
                 < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
-            let long = self.wanted_us <= 1.02 * window.duration_us as f32;
+            let long = self.wanted_us <= ENOUGH * window.duration_us as f32;
             let denied = self.registers() && self.refinement_denies(phase.omega_rad_s);
             // A neighbour of the right harmonic, too, is borne out by few turns; the next window shows more.
             let early = !long && self.doubted() && !self.pose.has_overtone();
@@ -171,7 +172,7 @@ impl Measurement {
             self.estimate = Estimate { sigma_rad_s: both.sigma_rad_s.max(sigma_rad_s), ..both };
         }
         self.take_out_growth();
-        self.widen(window, stated, held_up, lock.is_some());
+        self.widen(window, settings, held_up, lock.is_some());
     }
 
     /// Takes the turn out that growth makes of curved blades: all witnesses follow edges at a given distance from the axis.
@@ -184,9 +185,9 @@ impl Measurement {
     }
 
     /// Adds what the witnesses do not know of to the error, clock, camera and readout, or refuses where that is too much.
-    fn widen(&mut self, window: &Window<'_>, stated: &Stated, held_up: f32, locks: bool) {
+    fn widen(&mut self, window: &Window<'_>, settings: &Settings, held_up: f32, locks: bool) {
         let window_s = window.duration_us as f32 * 1e-6;
-        let clock = stated.clock_sigma_ppm * 1e-6 * self.estimate.omega_rad_s;
+        let clock = settings.clock_sigma_ppm * 1e-6 * self.estimate.omega_rad_s;
         let roll = if self.drift_px_s > STILL_PX_S {
             ROLL_RAD_PER_PX * self.drift_px_s * roll_share(window_s)
         } else {
@@ -339,10 +340,23 @@ impl Measurement {
     #[inline(never)]
     fn widen_mark(&mut self, shake_px: f32) {
         if self.may_be_mark() {
-            let turn_rad = self.evidence.periods.unwrap_or(0.0) * TAU;
-            let shake = shake_px / (self.disc.radius_px * turn_rad) * self.omega_rad_s;
+            let shake = self.shaken_share(shake_px) * self.omega_rad_s;
             self.estimate.sigma_rad_s = root_sum_square(self.estimate.sigma_rad_s, shake);
         }
+    }
+
+    /// By what share a shake of the axis across so many pixels changes the speed of a single mark.
+    fn shaken_share(&self, shake_px: f32) -> f32 {
+        let turn_rad = self.evidence.periods.unwrap_or(0.0) * TAU;
+        shake_px / (self.disc.radius_px * turn_rad)
+    }
+
+    /// Whether no reading of it will stand in this window, however it is registered: a single mark in too few turns for a lock, where a
+    /// coarse reading would be too rough.
+    pub(super) fn is_mark_too_slow(&self, window: &Window<'_>) -> bool {
+        self.may_be_mark()
+            && self.wanted_us > ENOUGH * window.duration_us as f32
+            && self.shaken_share(SHAKE_PX) > most_coarse(window)
     }
 
     /// A coarse reading that may be farther off than any reading may be is none, as the next window will show more; but where the
@@ -355,11 +369,9 @@ impl Measurement {
             let swing_rad_s = UNEVEN_SHARE * self.evidence.swing_rad_s.unwrap_or(0.0);
             self.estimate.sigma_rad_s = root_sum_square(self.estimate.sigma_rad_s, swing_rad_s);
         }
-        let short = window.duration_us < BASE_WINDOW_US;
-        let most = if short { MOST_SHORT_SIGMA } else { MOST_ERROR / COARSE_SIGMAS };
         let stretched = stretch > MOST_ERROR;
         let sigma_rad_s = root_sum_square(self.estimate.sigma_rad_s, roll_rad_s);
-        let rough = sigma_rad_s > most * self.omega_rad_s.abs();
+        let rough = sigma_rad_s > most_coarse(window) * self.omega_rad_s.abs();
         if stretched || rough {
             let slow = !stretched && self.wanted_us > window.duration_us as f32;
             let reason = if slow { Reason::TooSlow } else { Reason::Ambiguous };
@@ -383,6 +395,12 @@ impl Measurement {
         });
         even && !self.doubted() && (self.rates_alike(omega) || self.sharp())
     }
+}
+
+/// Largest relative standard error of a coarse reading.
+fn most_coarse(window: &Window<'_>) -> f32 {
+    let short = window.duration_us < BASE_WINDOW_US;
+    if short { MOST_SHORT_SIGMA } else { MOST_ERROR / COARSE_SIGMAS }
 }
 
 /// Mean weighted by the inverse variances, of witnesses whose errors have something in common, and which may be so many standard

@@ -172,6 +172,7 @@ fn measure(job: &Job) -> anyhow::Result<Vec<(Key, Sample)>> {
                 }
                 let mut settings = Settings::new(geometry);
                 settings.gyro_sigma_rad_s = spec::GYRO_SIGMA_RAD_S;
+                settings.all_stages = true;
                 let events: &[Event] = match window {
                     Window::Adaptive => &made.events,
                     Window::Paper => {
