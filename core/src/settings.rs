@@ -67,6 +67,20 @@ impl Settings {
             all_stages: false,
         }
     }
+
+    /// What is looked at: the part of the sensor that was chosen, as far as there are pixels, or all of it.
+    #[must_use]
+    pub fn view(&self) -> Roi {
+        let Geometry { width_px, height_px } = self.geometry;
+        let Roi { x, y, width_px: across_px, height_px: down_px } =
+            self.roi.unwrap_or(Roi { x: 0, y: 0, width_px, height_px });
+        Roi {
+            x,
+            y,
+            width_px: across_px.min(width_px.saturating_sub(x)),
+            height_px: down_px.min(height_px.saturating_sub(y)),
+        }
+    }
 }
 
 /// Memory lent by the caller: its sizes are the only difference between device and PC.

@@ -204,7 +204,7 @@ impl Measurement {
             Stage::Newton => self.newton(window, polar),
             Stage::Scan => self.scan(polar, angular),
             Stage::Doubt => self.doubt(window, polar, angular, even),
-            Stage::Arc => self.arc(polar),
+            Stage::Arc => self.arc(settings, polar),
             Stage::Symmetry => self.symmetry(settings, polar, angular),
             Stage::Overtone => self.overtone(polar, angular),
             Stage::Recovery => self.recovery(window, polar),

@@ -13,6 +13,7 @@ use super::angular::{AngularSums, DIRECTIONS};
 use super::polar::PolarEvent;
 use crate::math::{TAU, Turn, TurnRate, larger, quick_sqrt, sqrt};
 use crate::rotors::Disc;
+use crate::settings::Roi;
 
 /// Rings between centre and rim, each for both polarities: the innermost, within a rotor's inner edge, and those that a [`scan`] tells
 /// apart.
@@ -23,6 +24,8 @@ const BANKS: usize = 2 * RINGS;
 /// number that tells.
 const STANDS_OUT: f32 = 2.83;
 const LEAST_BESIDE: f32 = 16.0;
+/// Where a rotor's events lie on average, in radii.
+const MEAN_RADIUS: f32 = 0.7;
 
 /// Phases of the rotor's pattern by ring and polarity.
 #[derive(Clone, Copy, Debug, Default)]
@@ -73,12 +76,18 @@ impl Pattern {
         in_step / total.max(1.0)
     }
 
-    /// Whether the events keep step on one side of the centre only: in the half of all directions opposite to where most do, there are events
-    /// enough to tell, and these keep no more step than unrelated ones. Cost: about 450 instructions an event.
+    /// Whether the events keep step on one side of the centre only: in the half of all directions opposite to where most do, they keep no more
+    /// step than unrelated ones, or there are too few to tell, although that lies in `view`. Cost: about 450 instructions an event.
     #[must_use]
     // Not inlined: flash is short.
     #[inline(never)]
-    pub fn is_arc(track: &[PolarEvent], disc: Disc, omega_rad_s: f32, harmonic: u32) -> bool {
+    pub fn is_arc(
+        track: &[PolarEvent],
+        disc: Disc,
+        omega_rad_s: f32,
+        harmonic: u32,
+        view: Roi,
+    ) -> bool {
         let turns = Self::learn(track, disc, omega_rad_s, harmonic).turns();
         let rate = TurnRate::from_rad_s(omega_rad_s);
         // Where they lie, as much as they keep step; then what lies on the other side.
@@ -97,7 +106,13 @@ impl Pattern {
                 }
             }
         }
-        count > LEAST_BESIDE && sum < STANDS_OUT * sqrt(count)
+        if count > LEAST_BESIDE {
+            return sum < STANDS_OUT * sqrt(count);
+        }
+        // Nothing is seen there: it should be, unless it would lie outside the picture.
+        let per_length = MEAN_RADIUS * disc.radius_px / sqrt(x * x + y * y);
+        let (x_px, y_px) = (disc.x_px - per_length * x, disc.y_px - per_length * y);
+        x_px >= 0.0 && y_px >= 0.0 && view.contains(x_px as u16, y_px as u16)
     }
 
     /// Adds its sums to those of others.
@@ -280,7 +295,7 @@ mod tests {
     extern crate std;
     use std::vec::Vec;
 
-    const DISC: Disc = Disc { x_px: 0.0, y_px: 0.0, radius_px: 40.0 };
+    const DISC: Disc = Disc { x_px: 100.0, y_px: 100.0, radius_px: 40.0 };
 
     /// Events of a pattern of so many windings that keeps step with a frequency, every third of them anywhere.
     fn pattern(windings: i32, line_hz: f32) -> Vec<PolarEvent> {
@@ -323,13 +338,17 @@ mod tests {
     fn an_arc_keeps_step_on_one_side_only() {
         let (windings, line_hz) = (3, 120.0);
         let omega_rad_s = line_hz * TAU / windings as f32;
-        let is_arc = |track: &[PolarEvent]| Pattern::is_arc(track, DISC, omega_rad_s, 3);
+        let view = Roi { x: 0, y: 0, width_px: 200, height_px: 200 };
+        let in_view =
+            |track: &[PolarEvent], view| Pattern::is_arc(track, DISC, omega_rad_s, 3, view);
+        let is_arc = |track: &[PolarEvent]| in_view(track, view);
         let whole = pattern(windings, line_hz);
         assert!(!is_arc(&whole));
         let right = |event: &&PolarEvent| event.angle().sin_cos().1 > 0.3;
         let arc: Vec<_> = whole.iter().filter(right).copied().collect();
-        // With nothing beside it, an arc may as well be a rotor that shows on one side.
-        assert!(!is_arc(&arc));
+        // With nothing beside it, an arc may as well be a rotor that is partly outside the picture, where that ends there.
+        assert!(is_arc(&arc));
+        assert!(!in_view(&arc, Roi { x: DISC.x_px as u16, ..view }));
         let unrelated = pattern(windings, 777.0);
         let beside = unrelated.iter().filter(|event| !right(event)).copied();
         let before_noise: Vec<_> = arc.into_iter().chain(beside).collect();

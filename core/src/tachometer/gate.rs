@@ -4,7 +4,7 @@
 //! all that is asked here, of many at once; what else an event may be is told elsewhere, one by one.
 
 use crate::event::{Geometry, PackedEvent};
-use crate::settings::Settings;
+use crate::settings::{Roi, Settings};
 
 /// Bits above row and column of a packed event, which a sum carries into.
 const ABOVE: u32 = 1 << PackedEvent::COLUMN_AT | 1 << (2 * PackedEvent::COLUMN_AT);
@@ -45,19 +45,14 @@ impl Gate {
     /// A gate for events from `last_us` on and before `end_us`, both in microseconds; `None` when nothing is in view.
     pub fn new(settings: &Settings, last_us: u64, end_us: u64) -> Option<Self> {
         let sensor = settings.geometry;
-        let whole = (0, 0, sensor.width_px, sensor.height_px);
-        let (x0, y0, x1, y1) = settings.roi.map_or(whole, |roi| {
-            let (x1, y1) =
-                (roi.x.saturating_add(roi.width_px), roi.y.saturating_add(roi.height_px));
-            (roi.x, roi.y, x1.min(sensor.width_px), y1.min(sensor.height_px))
-        });
+        let Roi { x, y, width_px, height_px } = settings.view();
         let word = |x: u16, y: u16| u32::from(x) << PackedEvent::COLUMN_AT | u32::from(y);
-        (x0 < x1 && y0 < y1).then(|| Self {
+        (width_px > 0 && height_px > 0).then(|| Self {
             low_us: last_us as u32,
             // A quarter of the span of the low bits: what is further off is never taken for something near.
             left_us: end_us.saturating_sub(last_us).min(1 << 30) as u32,
-            room: word(LAST_SIDE - (x1 - 1), LAST_SIDE - (y1 - 1)),
-            first: (x0 > 0 || y0 > 0).then_some((x0, y0)),
+            room: word(LAST_SIDE + 1 - (x + width_px), LAST_SIDE + 1 - (y + height_px)),
+            first: (x > 0 || y > 0).then_some((x, y)),
             sensor,
         })
     }

@@ -130,8 +130,8 @@ impl Measurement {
     }
 
     /// Whether it shows on less than half of its way around: then it may be part of something larger.
-    pub(super) fn arc(&mut self, polar: &[PolarEvent]) {
-        if Pattern::is_arc(polar, self.disc, self.omega_rad_s, self.harmonic) {
+    pub(super) fn arc(&mut self, settings: &Settings, polar: &[PolarEvent]) {
+        if Pattern::is_arc(polar, self.disc, self.omega_rad_s, self.harmonic, settings.view()) {
             return self.refuse(Reason::Ambiguous);
         }
         self.stage = Stage::Symmetry;
