@@ -194,7 +194,7 @@ impl Measurement {
         let rivalled = |doubt: &Doubt| {
             (doubt.small || !settled) && doubt.rival_share > MOST_RIVAL * doubt.share
         };
-        !settled && self.standing() > IN_DOUBT || self.doubt.as_ref().is_some_and(rivalled)
+        !settled && self.is_rivalled() || self.doubt.as_ref().is_some_and(rivalled)
     }
 
     /// Whether the centre is to be looked about, as another harmonic keeps step too.
@@ -208,6 +208,11 @@ impl Measurement {
     #[inline(never)]
     pub(super) fn doubted(&self) -> bool {
         self.standing() > DOUBTFUL
+    }
+
+    /// Whether another harmonic keeps step almost as well.
+    pub(super) fn is_rivalled(&self) -> bool {
+        self.standing() > IN_DOUBT
     }
 
     /// Whether another harmonic keeps step at all, so that the centre may be off.

@@ -143,8 +143,10 @@ impl Measurement {
                 < MOST_LOCK_SIGMA * both.omega_rad_s.abs();
             let long = self.wanted_us <= ENOUGH * window.duration_us as f32;
             let denied = self.registers() && self.refinement_denies(phase.omega_rad_s);
-            // A neighbour of the right harmonic, too, is borne out by few turns; the next window shows more.
-            let early = !long && self.doubted() && !self.pose.has_overtone();
+            // A neighbour of the right harmonic, too, is borne out by few turns, and so is what moves behind a rotor in a hand, where
+            // another harmonic keeps step almost as well; the next window shows more.
+            let early =
+                !long && (self.doubted() && !self.pose.has_overtone() || self.is_rivalled());
             if denied || early || !self.bears_out(lock, Some(phase)) {
                 self.status = Status::Refused(Reason::Ambiguous);
             } else if sharp && long {
