@@ -153,8 +153,8 @@ impl Grid {
         let sides = [
             (above_px, above.map(|above| (above..above + 1, first, last))),
             (left_px, left.map(|left| (between.clone(), left, left))),
-            (right_px, (right < SIDE).then(|| (between, right, right))),
-            (below_px, (below < SIDE).then(|| (below..below + 1, first, last))),
+            (right_px, (right < SIDE).then_some((between, right, right))),
+            (below_px, (below < SIDE).then_some((below..below + 1, first, last))),
         ];
         for (apart_px, side) in sides {
             if let Some((rows, from, to)) = side

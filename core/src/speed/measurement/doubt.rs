@@ -194,7 +194,7 @@ impl Measurement {
         let rivalled = |doubt: &Doubt| {
             (doubt.small || !settled) && doubt.rival_share > MOST_RIVAL * doubt.share
         };
-        !settled && self.is_rivalled() || self.doubt.as_ref().is_some_and(rivalled)
+        !settled && self.closely_rivalled() || self.doubt.as_ref().is_some_and(rivalled)
     }
 
     /// Whether the centre is to be looked about, as another harmonic keeps step too.
@@ -211,7 +211,7 @@ impl Measurement {
     }
 
     /// Whether another harmonic keeps step almost as well.
-    pub(super) fn is_rivalled(&self) -> bool {
+    pub(super) fn closely_rivalled(&self) -> bool {
         self.standing() > IN_DOUBT
     }
 

@@ -146,7 +146,7 @@ impl Measurement {
             // A neighbour of the right harmonic, too, is borne out by few turns, and so is what moves behind a rotor in a hand, where
             // another harmonic keeps step almost as well; the next window shows more.
             let early =
-                !long && (self.doubted() && !self.pose.has_overtone() || self.is_rivalled());
+                !long && (self.doubted() && !self.pose.has_overtone() || self.closely_rivalled());
             if denied || early || !self.bears_out(lock, Some(phase)) {
                 self.status = Status::Refused(Reason::Ambiguous);
             } else if sharp && long {
