@@ -17,7 +17,7 @@ pub const TAU: f32 = core::f32::consts::TAU;
 // Not inlined: flash is short.
 #[inline(never)]
 pub fn sqrt(x: f32) -> f32 {
-    if x > 0.0 && x <= f32::MAX {
+    if (f32::MIN_POSITIVE..=f32::MAX).contains(&x) {
         let nearly = quick_sqrt(x);
         0.5 * (nearly + x / nearly)
     } else {
@@ -286,7 +286,9 @@ mod tests {
             let (below, above) = (libm::sqrtf(x).next_down(), libm::sqrtf(x).next_up());
             assert!((below..=above).contains(&sqrt(x)), "{x}");
         }
-        assert_eq!([0.0, f32::INFINITY].map(sqrt), [0.0, f32::INFINITY]);
+        for x in [0.0, 1e-45, 1e-40, f32::MIN_POSITIVE.next_down(), f32::INFINITY] {
+            assert_eq!(sqrt(x), libm::sqrtf(x), "{x}");
+        }
         assert!(sqrt(-1.0).is_nan() && sqrt(f32::NAN).is_nan());
     }
 

@@ -76,7 +76,7 @@ mod tests {
         const OFFSET_RAD_S: f32 = 0.02;
         let (mut roll, mut before_rad_s) = (Roll::NONE, f32::MAX);
         let (offset_rad_s, sigma_rad_s) = roll.offset(0.25);
-        assert!(offset_rad_s == 0.0 && (sigma_rad_s - 0.25).abs() < 1e-6);
+        assert!(offset_rad_s == 0.0 && (sigma_rad_s - 0.25).abs() < 1e-7);
         for second in 1..=600 {
             roll = roll.and(Roll::at(OFFSET_RAD_S, 1_000_000));
             let (offset_rad_s, sigma_rad_s) = roll.offset(0.2);
