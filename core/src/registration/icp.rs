@@ -4,14 +4,13 @@ use super::grid::{Grid, Metric};
 use super::rigid::{PointToHelicoid, PointToPoint, Rigid};
 use super::slice::{Slice, SlicePoint};
 use crate::math::{larger, quick_sqrt, sqrt};
+use crate::rotors::Disc;
 
 /// Iterations in one direction.
 const MOST_ITERATIONS: u8 = 10;
 /// A way ends when an iteration turns by less than this. Absolute: the paper's ratio to the accumulated yaw stops early
 /// at large angles (a bias of up to 0.8 permille) and never at small ones.
 const SETTLED_RAD: f32 = 1e-4;
-/// Points lie at seven tenths of the radius on average.
-const MEAN_RADIUS: f32 = 0.7;
 /// Fewest matches that determine a yaw.
 const LEAST_MATCHES: usize = 12;
 /// Matches farther than this in pixels are not used: of places only, and of places and times.
@@ -141,7 +140,8 @@ impl Icp {
         let run = &mut self.run;
         run.iterations += 1;
         let scatter_px = run.limit_px / TRIM;
-        let noise_rad = scatter_px / (MEAN_RADIUS * run.radius_px * quick_sqrt(matches as f32));
+        let noise_rad =
+            scatter_px / (Disc::MEAN_RADIUS * run.radius_px * quick_sqrt(matches as f32));
         let settled = turn_rad.abs() < (run.settled * noise_rad).max(SETTLED_RAD);
         if !settled && self.run.iterations < MOST_ITERATIONS {
             return Progress::Running;

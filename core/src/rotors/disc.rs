@@ -26,6 +26,9 @@ pub struct Disc {
 }
 
 impl Disc {
+    /// Where a rotor's events lie on average, in radii.
+    pub const MEAN_RADIUS: f32 = 0.7;
+
     /// Squared distance between the centres in px^2.
     #[must_use]
     pub fn distance2(&self, other: &Self) -> f32 {

@@ -24,8 +24,6 @@ const BANKS: usize = 2 * RINGS;
 /// number that tells.
 const STANDS_OUT: f32 = 2.83;
 const LEAST_BESIDE: f32 = 16.0;
-/// Where a rotor's events lie on average, in radii.
-const MEAN_RADIUS: f32 = 0.7;
 
 /// Phases of the rotor's pattern by ring and polarity.
 #[derive(Clone, Copy, Debug, Default)]
@@ -110,7 +108,7 @@ impl Pattern {
             return sum < STANDS_OUT * sqrt(count);
         }
         // Nothing is seen there: it should be, unless it would lie outside the picture.
-        let per_length = MEAN_RADIUS * disc.radius_px / sqrt(x * x + y * y);
+        let per_length = Disc::MEAN_RADIUS * disc.radius_px / sqrt(x * x + y * y);
         let (x_px, y_px) = (disc.x_px - per_length * x, disc.y_px - per_length * y);
         x_px >= 0.0 && y_px >= 0.0 && view.contains(x_px as u16, y_px as u16)
     }
