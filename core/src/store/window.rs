@@ -82,6 +82,7 @@ pub struct Window<'a> {
 
 impl<'a> Window<'a> {
     /// All events, oldest first.
+    #[cfg(test)]
     pub fn events(&self) -> impl Iterator<Item = StoredEvent> + use<'a> {
         let parts = self.parts;
         parts.into_iter().take(self.segments).flat_map(|part| part.iter().copied())
