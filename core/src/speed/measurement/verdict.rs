@@ -57,8 +57,10 @@ const COARSE_SPREAD: f32 = 0.5;
 const MOST_ERROR: f32 = 0.01;
 const COARSE_SIGMAS: f32 = 3.0;
 const LOCK_FITS_SIGMAS: f32 = 2.5;
-/// Standard error of a coarse reading of less than three blades, as a share of how much its speed seems to swing.
+/// Standard error of a coarse reading of less than three blades, as a share of how much its speed seems to swing; and what of that
+/// counts as error of a mark's lock before a hand that sways as fast as the mark turns.
 const UNEVEN_SHARE: f32 = 0.5;
+const MARK_SWING: f32 = 0.35;
 /// The largest relative error where the stream ended before a window was full.
 const MOST_SHORT_SIGMA: f32 = 0.012;
 /// What a hand shakes, in pixels, and blocks of a turn from which on a single mark's axis is told from the mark.
@@ -78,6 +80,8 @@ const QUEUE_SIGMA: f32 = 0.5;
 const ROLL_RAD_PER_PX: f32 = 1e-3 / core::f32::consts::SQRT_2;
 /// Slower wandering of the centre than this in px/s is the measurement's own noise.
 const STILL_PX_S: f32 = 6.0;
+/// The same of a single mark, whose path may take a part of the hand's motion for its turn.
+const MARK_STILL_PX_S: f32 = 4.0;
 /// Patterns that pass more slowly are told by any sensor that tells anything: one that looks every 2 ms.
 const SLOW_HZ: f32 = 250.0;
 /// Window over which the mean roll rate of a tremor of 1 to 12 Hz, from which longer ones keep the less, is what it is at an instant.
@@ -205,7 +209,9 @@ impl Measurement {
             Status::Coarse => self.widen_coarse(window, held_up / QUEUE_SIGMA, roll),
             Status::Locked if self.pose.in_period() < MARK_BLOCKS => self.widen_mark(SHAKE_PX),
             // Blurred edges tell of an axis that moves and was not followed.
-            Status::Locked if roll > 0.0 || !self.sharp() => self.steady_mark(),
+            Status::Locked if self.drift_px_s > MARK_STILL_PX_S || !self.sharp() => {
+                self.steady_mark();
+            }
             _ => {}
         }
         // What an axis that is not followed may do counts for less, the more turns there are: a longer window tells.
@@ -320,19 +326,25 @@ impl Measurement {
         self.parts == Some(1) || !self.alike && self.parts.is_none_or(|parts| parts == 2)
     }
 
-    /// From a hand, both witnesses of a mark's lock go along a path that takes part of the hand's motion for the mark's turn. The refinement
-    /// goes along none: it is a third one, and no surer than they are, however little its few pairs scatter.
+    /// From a hand, both witnesses of a mark's lock go along a path that takes part of the hand's motion for the mark's turn, and its speed
+    /// seems to swing by that. The refinement goes along none: it is a third one, and no surer than they are where it does not
+    /// swing, however little its few pairs scatter.
     // Not inlined: flash is short.
     #[inline(never)]
     fn steady_mark(&mut self) {
+        if !self.may_be_mark() {
+            return;
+        }
         let swaying = SWAYING_RAD_S / self.estimate.omega_rad_s.abs().max(SWAYING_RAD_S);
-        self.widen_mark(SWAY_PX * swaying * swaying);
-        let Evidence { refined_rad_s, refined_sigma_rad_s, .. } = self.evidence;
-        if let (true, Some(omega_rad_s), Some(own)) =
-            (self.may_be_mark(), refined_rad_s, refined_sigma_rad_s)
-        {
-            let sigma_rad_s = own.max(self.estimate.sigma_rad_s);
-            self.estimate = combine(self.estimate, Estimate { omega_rad_s, sigma_rad_s }, 1.0);
+        let swaying = swaying * swaying;
+        self.widen_mark(SWAY_PX * swaying);
+        let Evidence { refined_rad_s, refined_sigma_rad_s, swing_rad_s, .. } = self.evidence;
+        let steady = self.estimate.sigma_rad_s;
+        let swing = MARK_SWING * swaying * swing_rad_s.unwrap_or(0.0);
+        self.estimate.sigma_rad_s = root_sum_square(steady, swing);
+        if let (Some(omega_rad_s), Some(own)) = (refined_rad_s, refined_sigma_rad_s) {
+            let refined = Estimate { omega_rad_s, sigma_rad_s: own.max(steady) };
+            self.estimate = combine(self.estimate, refined, 1.0);
         }
     }
 
