@@ -61,7 +61,7 @@ const LOCK_FITS_SIGMAS: f32 = 2.5;
 /// counts as error of a mark's lock before a hand that sways as fast as the mark turns.
 const UNEVEN_SHARE: f32 = 0.5;
 const MARK_SWING: f32 = 0.35;
-/// The largest relative error where the stream ended before a window was full.
+/// The largest relative error where the stream ended before its first window was full: no other will tell.
 const MOST_SHORT_SIGMA: f32 = 0.012;
 /// What a hand shakes, in pixels, and blocks of a turn from which on a single mark's axis is told from the mark.
 const SHAKE_PX: f32 = 3.0;
@@ -413,7 +413,7 @@ impl Measurement {
 
 /// Largest relative standard error of a coarse reading.
 fn most_coarse(window: &Window<'_>) -> f32 {
-    let short = window.duration_us < BASE_WINDOW_US;
+    let short = window.is_first() && window.duration_us < BASE_WINDOW_US;
     if short { MOST_SHORT_SIGMA } else { MOST_ERROR / COARSE_SIGMAS }
 }
 
