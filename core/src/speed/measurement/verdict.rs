@@ -439,3 +439,33 @@ fn combine(a: Estimate, b: Estimate, usual_sigmas: f32) -> Estimate {
 fn roll_share(window_s: f32) -> f32 {
     (ROLL_LASTS_S / window_s).min(1.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::{MOST_SEGMENTS, MOST_SPARE, Store, StoredEvent};
+
+    #[test]
+    fn only_a_stream_that_is_shorter_than_a_window_may_be_told_roughly() {
+        let mut memory = [StoredEvent::default(); 16 * MOST_SEGMENTS];
+        let mut store = Store::new(&mut memory, MOST_SPARE, 25_000);
+        for _ in 0..6 {
+            store.close_segment();
+        }
+        assert_eq!(most_coarse(&store.window(6, 70_000)), MOST_SHORT_SIGMA);
+        assert!(most_coarse(&store.window(6, u64::MAX)) < 0.5 * MOST_ERROR);
+        store.drop_oldest();
+        assert!(most_coarse(&store.window(5, 70_000)) < 0.5 * MOST_ERROR, "one went before");
+    }
+
+    #[test]
+    fn witnesses_that_contradict_each_other_are_less_sure_together() {
+        let told = |omega_rad_s, sigma_rad_s| Estimate { omega_rad_s, sigma_rad_s };
+        let alike = combine(told(100.0, 1.0), told(100.5, 1.0), 1.0);
+        assert!((alike.omega_rad_s - 100.25).abs() < 1e-3 && alike.sigma_rad_s < 1.0);
+        let apart = combine(told(100.0, 1.0), told(110.0, 1.0), 1.0);
+        assert!((apart.omega_rad_s - 105.0).abs() < 1e-3 && apart.sigma_rad_s > 4.0);
+        let rough = combine(told(100.0, 1.0), told(110.0, 100.0), 1.0);
+        assert!((rough.omega_rad_s - 100.0).abs() < 0.01 && rough.sigma_rad_s < 1.1);
+    }
+}
