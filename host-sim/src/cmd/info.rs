@@ -62,6 +62,9 @@ fn about(file: &Path, args: &Args, told: &mut bool) -> anyhow::Result<()> {
         chunk.clear();
         let more = recording.read_chunk(&mut chunk);
         timeline.lay(&chunk, |event| statistics.add(event));
+        if recording.starts_anew() {
+            timeline.start_anew();
+        }
         note_imu(&mut imu, &mut imu_timeline, &recording.take_imu());
         match more {
             Ok(true) => {}

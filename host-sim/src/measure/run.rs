@@ -106,7 +106,9 @@ impl Run {
                     drain(tachometer, &mut keep);
                 }
                 if let Some(t_us) = set_back_us {
-                    parts.timeline.set_back_to(t_us);
+                    if parts.timeline.set_back_to(t_us) {
+                        tachometer.configure(plan.settings);
+                    }
                     (wait, rolled_us) = (Wait::default(), 0);
                 }
             }
@@ -184,6 +186,9 @@ impl<'a> Parts<'a> {
     /// Puts the next events in place of `part`. Where the clock is set back, there are none, and the time that it is set to is told.
     fn next(&mut self, part: &mut Vec<Event>) -> Option<u64> {
         if self.taken == self.events.len() {
+            if self.recording.starts_anew() {
+                self.timeline.start_anew();
+            }
             self.read();
         }
         let rest = &self.events[self.taken..];
@@ -203,7 +208,7 @@ impl<'a> Parts<'a> {
         });
         self.events_read += self.events.len() as u64;
         if let Some(ties) = &mut self.ties {
-            ties.order(&mut self.events, self.more);
+            ties.order(&mut self.events, self.more && !self.recording.starts_anew());
         }
     }
 }

@@ -10,6 +10,8 @@ pub struct Timeline {
     shift_us: u64,
     /// Latest time of the clock in this part.
     latest_us: Option<u64>,
+    /// Whether what comes next is of another clock, wherever its times lie.
+    starts_anew: bool,
     /// Where it was set back first, and by how much.
     first: Option<(u64, u64)>,
     events: u64,
@@ -19,6 +21,11 @@ pub struct Timeline {
 impl Timeline {
     /// How many of the next events come before the clock is set back: none where it is now.
     pub fn part(&mut self, events: &[Event]) -> usize {
+        if self.starts_anew && self.latest_us.is_some() && !events.is_empty() {
+            return 0;
+        }
+        // Where nothing came before, there is no border.
+        self.starts_anew &= events.is_empty();
         let mut latest_us = self.latest_us.unwrap_or(0);
         let goes_back = |event: &Event| {
             let goes_back = latest_us.saturating_sub(event.t_us) >= CLOCK_RESET_US;
@@ -32,13 +39,24 @@ impl Timeline {
         part
     }
 
-    /// Begins the next part: the clock was set back to the time of its first event.
-    pub fn set_back_to(&mut self, t_us: u64) {
+    /// Says that what comes next is another recording, which is a part of its own however near its clock is.
+    pub const fn start_anew(&mut self) {
+        self.starts_anew = true;
+    }
+
+    /// Begins the next part: the clock was set back to the time of its first event. Tells whether by so little that the tachometer,
+    /// which is told of it by the times alone, would take it for disorder.
+    pub fn set_back_to(&mut self, t_us: u64) -> bool {
+        self.starts_anew = false;
         let by_us = self.latest_us.unwrap_or(t_us).saturating_sub(t_us);
-        self.first.get_or_insert((self.events, by_us));
         self.shift_us = self.shift_us.saturating_add(by_us);
         self.latest_us = Some(t_us);
-        self.set_back += 1;
+        // Another recording's clock may be ahead, too.
+        if by_us > 0 {
+            self.first.get_or_insert((self.events, by_us));
+            self.set_back += 1;
+        }
+        by_us < CLOCK_RESET_US
     }
 
     /// Whether what the clock told beside the events belongs to this part: behind the border there may come some of the part before,
@@ -137,6 +155,22 @@ mod tests {
             }
             assert_eq!(laid, laid_us, "{at_once}");
             assert_eq!((timeline.first, timeline.set_back), (Some((3, S)), 2));
+        }
+    }
+
+    #[test]
+    fn another_recording_is_a_part_of_its_own_wherever_its_clock_is() {
+        let event = |t_us| Event { t_us, x: 0, y: 0, polarity: Polarity::On };
+        for (next_us, laid_us, is_set_back) in [(100, 600, true), (700, 700, false)] {
+            let (mut timeline, mut laid) = (Timeline::default(), Vec::new());
+            // Nothing comes before the first one.
+            timeline.start_anew();
+            assert_eq!(timeline.part(&[event(500)]), 1);
+            timeline.lay(&[event(600)], |_| ());
+            timeline.start_anew();
+            assert_eq!(timeline.part(&[event(next_us)]), 0);
+            timeline.lay(&[event(next_us)], |event| laid.push(event.t_us));
+            assert_eq!((laid, timeline.is_set_back()), (vec![laid_us], is_set_back));
         }
     }
 }

@@ -81,6 +81,8 @@ pub struct Side {
     pub imu: Vec<ImuSample>,
     /// What a person should know, one sentence each: cut files, skipped streams.
     pub notes: Vec<String>,
+    /// Whether what comes next is another recording, with a clock of its own.
+    pub(crate) starts_anew: bool,
 }
 
 impl Side {
@@ -108,6 +110,7 @@ pub struct Recording {
     out_of_order: u64,
     out_of_bounds: u64,
     last_us: u64,
+    starts_anew: bool,
     ended: bool,
     pending: Option<RecordingError>,
 }
@@ -133,6 +136,7 @@ impl Recording {
             out_of_order: 0,
             out_of_bounds: 0,
             last_us: 0,
+            starts_anew: false,
             ended: false,
             pending: None,
         }
@@ -151,6 +155,7 @@ impl Recording {
             return Err(error);
         }
         let first = events.len();
+        self.starts_anew = false;
         while !self.ended && events.len() - first < Self::CHUNK_EVENTS {
             let before = events.len();
             match self.source.read(events, &mut self.side) {
@@ -166,8 +171,19 @@ impl Recording {
                 }
             }
             self.check(events, before);
+            if std::mem::take(&mut self.side.starts_anew) {
+                self.starts_anew = true;
+                break;
+            }
         }
         Ok(!self.ended)
+    }
+
+    /// Whether the last chunk ended where another recording was put behind: the clock of what comes next is another one, wherever
+    /// its times lie.
+    #[must_use]
+    pub const fn starts_anew(&self) -> bool {
+        self.starts_anew
     }
 
     /// Drops and counts what lies outside the sensor, counts steps back in time.

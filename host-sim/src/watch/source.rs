@@ -109,7 +109,9 @@ pub fn file(mut recording: Recording, speed: f64) -> Source {
                     let Some(last) = piece.last() else { continue };
                     // No piece is as long as a clock is set back by.
                     if timeline.part(piece) == 0 {
-                        timeline.set_back_to(piece[0].t_us);
+                        if timeline.set_back_to(piece[0].t_us) {
+                            tachometer.configure(settings);
+                        }
                         timeline.part(piece);
                     }
                     let first_us = *first_us.get_or_insert(piece[0].t_us);
@@ -123,6 +125,9 @@ pub fn file(mut recording: Recording, speed: f64) -> Source {
                         let laid = timeline.laid(reading);
                         teller.tell(Told::Reading(ReadingRow::new(&laid, first_us)));
                     });
+                }
+                if recording.starts_anew() {
+                    timeline.start_anew();
                 }
                 if !more {
                     break;

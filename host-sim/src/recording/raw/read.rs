@@ -162,6 +162,7 @@ impl<D: Decoder> Words<D> {
         }
         self.input.consume(header.length);
         self.decoder.restart();
+        side.starts_anew = true;
         side.notes.push(format!("another recording begins at byte {offset}: its time starts anew"));
         Ok(true)
     }
