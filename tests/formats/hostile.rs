@@ -179,6 +179,11 @@ fn recordings_behind_each_other() {
     let one = bytes_of(WriteFormat::Csv, &events);
     let found = read_bytes("a.csv", &[one.as_slice(), &one].concat(), None).expect("text");
     assert_eq!(found.events.len(), 2 * events.len());
+    let one = bytes_of(WriteFormat::Npy, &events);
+    let found = read_bytes("a.npy", &[one.as_slice(), &one].concat(), None).expect("an array");
+    assert_eq!(found.events.len(), events.len());
+    let told = format!("what follows at byte {} is left out", one.len());
+    assert!(found.recording.side().notes[0].contains(&told));
     let one = bytes_of(WriteFormat::Aedat4, &events);
     let found = read_bytes("a.aedat4", &[one.as_slice(), &one].concat(), None).expect("AEDAT4");
     assert_eq!(found.events.len(), events.len());

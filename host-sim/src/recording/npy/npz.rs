@@ -56,7 +56,7 @@ fn columns(
     let mut arrays = Vec::new();
     let mut fields = Vec::new();
     let mut told = None;
-    let mut left = u64::MAX;
+    let mut lengths: Vec<(&str, u64)> = Vec::new();
     for (place, wanted) in NAMES.iter().enumerate() {
         let found = members.iter().find_map(|member| {
             let (stem, unit) = unit_of_name(&member.name.to_ascii_lowercase());
@@ -74,9 +74,18 @@ fn columns(
         let Elements::Plain(kind) = header.elements else {
             return Err(damaged(format!("the array \"{}\" has fields", member.name)));
         };
-        left = left.min(header.shape.iter().product());
+        lengths.push((&member.name, header.shape.iter().copied().fold(1, u64::saturating_mul)));
         fields.push(Field { array: arrays.len(), offset: 0, kind });
         arrays.push(Array { input, stride: kind.bytes });
+    }
+    let left = lengths.first().map_or(0, |&(_, length)| length);
+    if lengths.iter().any(|&(_, length)| length != left) {
+        let told: Vec<String> =
+            lengths.iter().map(|(name, length)| format!("\"{name}\" {length}")).collect();
+        return Err(RecordingError::Unsupported {
+            what: format!("the arrays are of different lengths: {}", told.join(", ")),
+            advice: "save arrays with one entry each for every event".to_owned(),
+        });
     }
     let fields: [Field; 4] = fields.try_into().map_err(|_| damaged("no four arrays".to_owned()))?;
     let mut source = Arrays { arrays, fields, unit: TimeUnit::Microseconds, left, record: 0 };
@@ -129,4 +138,42 @@ fn input(path: &Path, member: &Member) -> Result<Input, RecordingError> {
     } else {
         Box::new(packed)
     }))
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test")]
+mod tests {
+    use std::io::Write;
+
+    use zip::write::{SimpleFileOptions, ZipWriter};
+
+    use super::*;
+    use crate::recording::npy::MAGIC;
+
+    /// An archive of byte arrays t, x, y, p of these lengths.
+    fn archive(path: &Path, lengths: [usize; 4]) {
+        let mut zip = ZipWriter::new(File::create(path).unwrap());
+        for (name, length) in ["t", "x", "y", "p"].into_iter().zip(lengths) {
+            let header =
+                format!("{{'descr': '|u1', 'fortran_order': False, 'shape': ({length},)}}");
+            let told = (header.len() as u16).to_le_bytes();
+            let options =
+                SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+            zip.start_file(format!("{name}.npy"), options).unwrap();
+            let bytes = [MAGIC, &[1, 0], &told, header.as_bytes(), &vec![1; length]].concat();
+            zip.write_all(&bytes).unwrap();
+        }
+        zip.finish().unwrap();
+    }
+
+    #[test]
+    fn arrays_of_different_lengths_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("events.npz");
+        archive(&path, [20; 4]);
+        assert!(open(&path, None).is_ok());
+        archive(&path, [20, 10, 20, 20]);
+        let told = open(&path, None).err().unwrap().to_string();
+        assert!(told.contains("different lengths: \"t\" 20, \"x\" 10, \"y\" 20"), "{told}");
+    }
 }

@@ -149,6 +149,20 @@ impl Arrays {
         Ok(sentence)
     }
 
+    /// Says that there is more behind the events that the header counts, as in files that were put behind each other.
+    fn note_rest(&mut self, side: &mut Side) -> Result<(), RecordingError> {
+        for array in &mut self.arrays {
+            let offset = array.input.offset();
+            if !array.input.peek(1)?.is_empty() {
+                side.notes.push(format!(
+                    "the header counts no more events: what follows at byte {offset} is left out"
+                ));
+                break;
+            }
+        }
+        Ok(())
+    }
+
     fn event(&self, index: usize) -> Result<Event, String> {
         let number = |place: usize| {
             let Field { array, offset, kind } = self.fields[place];
@@ -201,6 +215,8 @@ impl Source for Arrays {
         if count == 0 {
             if self.left > 0 {
                 side.notes.push(format!("the file ends {} events early", self.left));
+            } else {
+                self.note_rest(side)?;
             }
             return Ok(false);
         }
@@ -218,7 +234,8 @@ impl Source for Arrays {
         }
         self.left -= count as u64;
         self.record += count as u64;
-        Ok(self.left > 0)
+        // What follows is noted when nothing more is read.
+        Ok(true)
     }
 }
 
