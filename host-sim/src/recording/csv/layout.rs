@@ -123,11 +123,14 @@ fn order(columns: [usize; 4]) -> String {
 pub fn unit_of_name(name: &str) -> (String, Option<TimeUnit>) {
     // faery writes the size into the names: "x@640".
     let (stem, suffix) = name.split_once(['_', '[', '(', ' ', '@']).unwrap_or((name, ""));
-    let unit = match suffix.trim_matches(|c: char| !c.is_ascii_alphabetic()) {
+    // Unicode has two that look alike: the micro sign and the Greek letter.
+    let suffix = suffix.replace(['\u{b5}', '\u{3bc}'], "u");
+    // What remains of another alphabet stays: it must not leave an "s" behind.
+    let unit = match suffix.trim_matches(|c: char| !c.is_alphabetic()) {
         "s" | "sec" | "seconds" => Some(TimeUnit::Seconds),
-        "ms" | "milliseconds" => Some(TimeUnit::Milliseconds),
-        "us" | "micros" | "microseconds" => Some(TimeUnit::Microseconds),
-        "ns" | "nanoseconds" => Some(TimeUnit::Nanoseconds),
+        "ms" | "msec" | "millis" | "milliseconds" => Some(TimeUnit::Milliseconds),
+        "us" | "usec" | "micros" | "microseconds" => Some(TimeUnit::Microseconds),
+        "ns" | "nsec" | "nanos" | "nanoseconds" => Some(TimeUnit::Nanoseconds),
         _ => None,
     };
     (stem.trim().to_owned(), unit)
@@ -259,6 +262,18 @@ mod tests {
             columns("# timestamp [ns], x, y, p\n5000,1,2,1\n"),
             ([0, 1, 2, 3], TimeUnit::Nanoseconds)
         );
+        for (name, unit) in [
+            ("t [\u{b5}s]", TimeUnit::Microseconds),
+            ("t_\u{b5}s", TimeUnit::Microseconds),
+            ("timestamp (\u{3bc}s)", TimeUnit::Microseconds),
+            ("t_\u{3bc}sec", TimeUnit::Microseconds),
+            ("t_usec", TimeUnit::Microseconds),
+            ("t_msec", TimeUnit::Milliseconds),
+            ("t_nsec", TimeUnit::Nanoseconds),
+        ] {
+            let head = format!("{name},x,y,p\n5000,1,2,1\n");
+            assert_eq!(columns(&head), ([0, 1, 2, 3], unit), "{name}");
+        }
         let faery = find("t,x@320,y@240,on\n5,1,2,1\n", None).unwrap();
         assert_eq!((faery.columns, faery.geometry), ([0, 1, 2, 3], Geometry::new(320, 240)));
         assert_eq!(columns("t_s x y p\n0.5 1 2 1\n"), ([0, 1, 2, 3], TimeUnit::Seconds));
