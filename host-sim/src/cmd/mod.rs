@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Write as _};
 use std::path::Path;
 
 use anyhow::{Context as _, bail};
-use evtach_host::recording::Recording;
+use evtach_host::recording::{Recording, SHUFFLED};
 
 pub mod bench;
 pub mod convert;
@@ -53,9 +53,7 @@ fn note(recording: &Recording, name: &str) {
 /// Refuses a recording, once it is read, of which no speed would be right.
 fn in_order(recording: &Recording, name: &str) -> anyhow::Result<()> {
     if recording.is_shuffled() {
-        bail!(
-            "{name}: the recording is not in time order; sort its events by time, then try again"
-        );
+        bail!("{name}: {SHUFFLED}");
     }
     Ok(())
 }

@@ -62,7 +62,12 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(failure) = monitor.failure() {
         eprintln!("{name}: {failure}");
     }
-    Ok(ExitCode::from(u8::from(!monitor.seen_speed())))
+    // Where a speed was seen before, what failed then is told, but the speed stands.
+    Ok(ExitCode::from(match (monitor.seen_speed(), monitor.failure()) {
+        (true, _) => 0,
+        (false, None) => 1,
+        (false, Some(_)) => 2,
+    }))
 }
 
 /// Whether a path is a device: recordings are files.

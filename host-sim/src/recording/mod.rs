@@ -30,6 +30,10 @@ use open::Progress;
 pub use open::{open, open_reader};
 pub use time_unit::TimeUnit;
 
+/// What is said of a recording that [is shuffled](Recording::is_shuffled).
+pub const SHUFFLED: &str =
+    "the recording is not in time order; sort its events by time, then try again";
+
 /// Parses a sensor size such as "640x480".
 ///
 /// # Errors

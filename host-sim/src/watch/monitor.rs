@@ -24,6 +24,8 @@ pub enum Told {
     End,
     /// There is nothing more to come, and why: something failed.
     Failure(String),
+    /// No reading is right, those told neither, and why.
+    Refusal(String),
 }
 
 /// What is shown.
@@ -75,6 +77,11 @@ impl Monitor {
             Told::End => {
                 "the recording has ended".clone_into(&mut self.note);
                 self.ended = true;
+            }
+            Told::Refusal(why) => {
+                self.readings.clear();
+                self.seen_speed = false;
+                self.take(Told::Failure(why), now);
             }
             Told::Failure(failure) => {
                 self.note.clone_from(&failure);

@@ -13,7 +13,7 @@ use serial2::SerialPort;
 
 use super::Told;
 use crate::measure::{Capacity, ReadingRow, Timeline, drain, feed, with_tachometer};
-use crate::recording::Recording;
+use crate::recording::{Recording, SHUFFLED};
 
 /// Readings on their way to the screen.
 const WAITING: usize = 64;
@@ -103,6 +103,10 @@ pub fn file(mut recording: Recording, speed: f64) -> Source {
                     end = Told::Failure(error.to_string());
                     false
                 });
+                // Of what is out of order so far no reading is right.
+                if recording.is_shuffled() {
+                    chunk.clear();
+                }
                 tachometer.lost(recording.lost() - lost);
                 lost = recording.lost();
                 for piece in chunk.chunk_by(|a, b| a.t_us / PIECE_US == b.t_us / PIECE_US) {
@@ -132,6 +136,9 @@ pub fn file(mut recording: Recording, speed: f64) -> Source {
                 if !more {
                     break;
                 }
+            }
+            if recording.is_shuffled() {
+                return teller.tell(Told::Refusal(SHUFFLED.to_owned()));
             }
             tachometer.finish();
             drain(tachometer, |reading| {
@@ -229,7 +236,12 @@ mod tests {
     use std::os::unix::net::UnixStream;
 
     use super::*;
+    use crate::recording::write::{WriteFormat, create};
     use crate::recording::{self, OpenOptions, RecordingError};
+
+    fn demo() -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../demo/fan.raw")
+    }
 
     const LINE: &str = r#"{"t_s":1.25,"window_s":0.15,"status":"locked","reason":null,"rotors":[{"id":"A","x_px":167.5,"y_px":146.0,"radius_px":55.0,"rpm":1180.3,"rpm_sigma":0.63,"direction":"cw","blades":5,"accel_rpm_per_s":null,"frame":"camera","status":"locked","reason":null}]}"#;
 
@@ -270,8 +282,7 @@ mod tests {
 
     #[test]
     fn a_recording_tells_its_readings_then_that_it_has_ended() -> Result<(), RecordingError> {
-        let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../demo/fan.raw");
-        let source = file(recording::open(&demo, &OpenOptions::default())?, 1e6);
+        let source = file(recording::open(&demo(), &OpenOptions::default())?, 1e6);
         let told: Vec<Told> = source.told.iter().collect();
         let (last, readings) = told.split_last().expect("something was told");
         assert_eq!(last, &Told::End);
@@ -285,11 +296,29 @@ mod tests {
     }
 
     #[test]
+    fn a_shuffled_recording_tells_no_reading() -> Result<(), RecordingError> {
+        let mut events = Vec::new();
+        let mut demo = recording::open(&demo(), &OpenOptions::default())?;
+        while demo.read_chunk(&mut events)? {}
+        for block in events.chunk_by_mut(|a, b| a.t_us / 4_000 == b.t_us / 4_000) {
+            block.sort_by_key(|event| (event.y, event.x, event.t_us));
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("shuffled.csv");
+        let mut writer = create(&path, WriteFormat::Csv, demo.geometry)?;
+        writer.write(&events)?;
+        writer.finish()?;
+        let source = file(recording::open(&path, &OpenOptions::default())?, 1e6);
+        let told: Vec<Told> = source.told.iter().collect();
+        assert_eq!(told, [Told::Refusal(SHUFFLED.to_owned())]);
+        Ok(())
+    }
+
+    #[test]
     fn a_view_that_is_closed_early_stops_its_source() -> Result<(), RecordingError> {
-        let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../demo/fan.raw");
         let start = Instant::now();
         // Two minutes long at this speed.
-        drop(file(recording::open(&demo, &OpenOptions::default())?, 0.001));
+        drop(file(recording::open(&demo(), &OpenOptions::default())?, 0.001));
         assert!(start.elapsed() < Duration::from_secs(30));
         Ok(())
     }
