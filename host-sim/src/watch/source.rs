@@ -28,13 +28,13 @@ const PIECE_US: u64 = 20_000;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SourceError {
-    /// It cannot be opened.
-    #[error("{}: {source}; check the cable, and that no other program has the port open", .path.display())]
+    /// It cannot be opened. The message tells the cause, which is no source beside it: it would be told twice.
+    #[error("{}: {cause}; check the cable, and that no other program has the port open", .path.display())]
     Open {
         /// The port.
         path: PathBuf,
         /// What the system says.
-        source: io::Error,
+        cause: io::Error,
     },
 }
 
@@ -172,7 +172,7 @@ pub fn port(path: &Path, baud: u32) -> Result<Source, SourceError> {
         port.set_write_timeout(PATIENCE)?;
         Ok(port)
     });
-    let port = opened.map_err(|source| SourceError::Open { path: path.into(), source })?;
+    let port = opened.map_err(|cause| SourceError::Open { path: path.into(), cause })?;
     Ok(listen_to(port))
 }
 
@@ -271,6 +271,12 @@ mod tests {
         device.read_exact(&mut asked)?;
         assert_eq!(&asked, b"SYST:LOG OFF\n");
         Ok(())
+    }
+
+    #[test]
+    fn the_cause_of_a_port_that_does_not_open_is_told_once() {
+        let error = port(Path::new("/dev/null"), 115_200).expect_err("no port");
+        assert!(std::error::Error::source(&error).is_none(), "{error}");
     }
 
     #[test]
