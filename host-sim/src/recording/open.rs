@@ -31,7 +31,7 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Recording, RecordingEr
     let geometry = if let Some(geometry) = settled(&mut opened, options) {
         geometry
     } else {
-        if path.as_os_str() == "-" {
+        if is_pipe(path) {
             return Err(RecordingError::NoGeometry { format: opened.format });
         }
         let geometry = scan(&mut opened)?;
@@ -40,6 +40,11 @@ pub fn open(path: &Path, options: &OpenOptions) -> Result<Recording, RecordingEr
         geometry
     };
     Ok(Recording::new(opened, &geometry, progress))
+}
+
+/// Whether a recording cannot be read twice: stdin, and what is no file by another name, as `<(...)` of a shell.
+fn is_pipe(path: &Path) -> bool {
+    path.as_os_str() == "-" || std::fs::metadata(path).is_ok_and(|found| !found.is_file())
 }
 
 /// The size that the person stated, else what the recording told.
@@ -204,7 +209,7 @@ fn sniff(
         return npy::open(input, time_unit);
     }
     if head.starts_with(npy::ZIP_MAGIC) {
-        return if path.as_os_str() == "-" || !unpack {
+        return if is_pipe(path) || !unpack {
             Err(needs_file("an .npz archive"))
         } else {
             npy::open_npz(path, time_unit)
@@ -214,7 +219,7 @@ fn sniff(
         return ros2::open_mcap(input);
     }
     if head.starts_with(ros2::SQLITE_MAGIC) {
-        return if path.as_os_str() == "-" || !unpack {
+        return if is_pipe(path) || !unpack {
             Err(needs_file("a .db3 bag"))
         } else {
             ros2::open_sqlite(path)

@@ -167,7 +167,12 @@ pub fn create(
     } else {
         let file = File::create(path)
             .map_err(|cause| RecordingError::Open { path: path.display().to_string(), cause })?;
-        Target::File(BufWriter::with_capacity(1 << 18, file))
+        // A pipe may have a name, too, as `>(...)` of a shell.
+        if file.metadata().is_ok_and(|found| found.is_file()) {
+            Target::File(BufWriter::with_capacity(1 << 18, file))
+        } else {
+            Target::Pipe(Box::new(BufWriter::with_capacity(1 << 18, file)))
+        }
     };
     let sink: Box<dyn Sink> = match format {
         WriteFormat::Evt2 => Box::new(Evt2Writer::new(target, geometry)?),

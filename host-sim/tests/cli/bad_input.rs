@@ -154,6 +154,10 @@ fn no_geometry_from_a_pipe() {
     let bytes = std::fs::read(&path).expect("the file just written");
     let run = evtach(&["measure", "-"], &bytes);
     assert_refused_as_bad(&run, "--geometry WxH");
+    if cfg!(target_os = "linux") {
+        let named = evtach(&["measure", "/dev/stdin"], &bytes);
+        assert_refused_as_bad(&named, "--geometry WxH");
+    }
     let run = evtach(&["measure", "--geometry", "200x160", "-"], &bytes);
     assert_eq!(run.code, Some(0), "{}", run.stderr);
     assert_reads_the_rotor(&run.stdout);
