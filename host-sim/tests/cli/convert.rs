@@ -60,6 +60,27 @@ fn pipes_and_times_the_format_cannot_hold() {
     assert!(run.stdout == lines(expected), "{}", run.stderr);
 }
 
+/// A pipe takes no position of the table afterwards: the table would be read as a packet.
+#[test]
+fn aedat4_through_a_pipe_is_whole() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let events = rotor();
+    let from = file(&folder, "in.raw", WriteFormat::Evt3, &events);
+    // By its name, too, it is a pipe.
+    let names: &[&str] = if cfg!(target_os = "linux") { &["-", "/dev/stdout"] } else { &["-"] };
+    for name in names {
+        let output = Command::new(env!("CARGO_BIN_EXE_evtach"))
+            .args(["convert", &from, name, "--to", "aedat4"])
+            .output()
+            .expect("evtach starts");
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{name}: {stderr}");
+        let run = evtach(&["convert", "-", "-", "--to", "csv"], &output.stdout);
+        assert_eq!(run.code, Some(0), "{name}: {}", run.stderr);
+        assert!(run.stdout == lines(events.iter().copied()), "{name}: {}", run.stderr);
+    }
+}
+
 #[test]
 fn a_part_of_a_recording() {
     let folder = TempDir::new().expect("a temporary folder");

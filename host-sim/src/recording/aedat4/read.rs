@@ -37,7 +37,10 @@ pub(crate) fn open(mut input: Input) -> Result<Opened, RecordingError> {
     let about = stream.source.iter().map(|source| ("source".to_owned(), source.clone())).collect();
     let mut side_notes = Vec::new();
     if header.packets_end.is_none() {
-        side_notes.push("the recording was not closed: read up to the end of the file".to_owned());
+        side_notes.push(
+            "the header does not say where the packets end, as in a pipe or a recording that was not closed: read up to the end"
+                .to_owned(),
+        );
     }
     let source = Aedat4 {
         packets: Packets::new(input, header.compression, header.packets_end),

@@ -134,6 +134,10 @@ impl Sink for Aedat4Writer {
         let rest = std::mem::take(&mut self.pending);
         self.packet(&rest)?;
         self.flush_imu()?;
+        if !self.target.can_patch() {
+            // The header can no more tell where the table is: readers would take it for a packet, and without it go through the packets.
+            return self.target.flush().map_err(RecordingError::Write);
+        }
         let table = compress(build::table(&mut self.builder, &self.entries))?;
         self.target.write_all(&table).map_err(RecordingError::Write)?;
         if self.entries.iter().all(|entry| entry.stream != IMU_STREAM) {
