@@ -88,9 +88,17 @@ impl How {
         if self.gyro && !run.has_gyro {
             eprintln!("{name}: no gyro samples; speeds are relative to the camera");
         }
+        // Before what is wrong, as it may be why.
+        note(&recording, &name);
         match run.damage {
             Some(damage) if run.events_read == 0 => return Err(damage).context(name),
             Some(damage) => eprintln!("{name}: {damage}; measured what came before"),
+            None if run.events_read == 0 && recording.out_of_bounds() > 0 => {
+                let Geometry { width_px, height_px } = recording.geometry;
+                bail!(
+                    "{name}: no event lies inside a sensor of {width_px}x{height_px}; state its size with --geometry WxH"
+                )
+            }
             None if run.events_read == 0 => bail!(
                 "{name}: the recording holds no events; record again, or check the format with `evtach info`"
             ),
@@ -99,7 +107,6 @@ impl How {
         if run.readings.is_empty() && (!self.span.is_all() || self.roi.is_some()) {
             bail!("{name}: no events between --start and --end inside --roi; widen them");
         }
-        note(&recording, &name);
         if run.out_of_order > 0 {
             eprintln!("{name}: {} events stepped back in time and were left out", run.out_of_order);
         }

@@ -190,6 +190,9 @@ fn events_outside_the_sensor() {
     let told = format!("{count} events outside the sensor left out");
     assert!(run.stderr.contains(&told), "{}", run.stderr);
     assert!(run.stderr.contains("--geometry"), "{}", run.stderr);
+    let raw = write(&folder, "rotor.raw", &rotor()).display().to_string();
+    let run = evtach(&["measure", "--geometry", "1x1", &raw], b"");
+    assert_refused_as_bad(&run, "no event lies inside a sensor of 1x1");
 }
 
 #[test]
