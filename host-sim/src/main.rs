@@ -1,4 +1,8 @@
 //! `evtach`: rotor speed from event recordings.
+#![deny(
+    clippy::print_stderr,
+    reason = "it panics where stderr is closed or full: `cmd::tell` does not"
+)]
 
 mod cmd;
 
@@ -46,7 +50,7 @@ fn main() -> ExitCode {
         Command::Watch(args) => cmd::watch::run(args),
     };
     result.unwrap_or_else(|error| {
-        eprintln!("evtach: {error:#}");
+        cmd::tell(format!("evtach: {error:#}"));
         ExitCode::from(2)
     })
 }

@@ -12,9 +12,9 @@ use evtach_host::recording::{self, ImuSample};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::how::parse_roi;
-use super::keep_apart;
 use super::span::Span;
 use super::stated::Stated;
+use super::{keep_apart, tell};
 
 /// Arguments of `evtach convert`.
 #[derive(clap::Args)]
@@ -54,7 +54,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let options = args.stated.into();
     let mut recording = recording::open(&args.input, &options).with_context(|| name.clone())?;
     for sentence in &recording.assumed {
-        eprintln!("assumed: {sentence}");
+        tell(format!("assumed: {sentence}"));
     }
     let mut writer = write::create(&args.output, format, recording.geometry)
         .with_context(|| args.output.display().to_string())?;
@@ -89,13 +89,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     writer.finish().with_context(|| args.output.display().to_string())?;
     bar.finish_and_clear();
     for note in &recording.side().notes {
-        eprintln!("note: {note}");
+        tell(format!("note: {note}"));
     }
     picker.report(recording.out_of_bounds());
     match failure {
         // What is damaged is not wanted.
         Some(error) if picker.is_past_end => {
-            eprintln!("note: behind what is kept, {error}");
+            tell(format!("note: behind what is kept, {error}"));
             Ok(ExitCode::SUCCESS)
         }
         Some(error) => Err(error).with_context(|| name),
@@ -222,10 +222,10 @@ impl Picker {
             // A minute of headroom: the recording goes on from its first event.
             let shift = self.rebase || t_us.saturating_add(60_000_000) > self.latest_us;
             if shift && !self.rebase {
-                eprintln!(
+                tell(format!(
                     "note: time begins at zero, because {} cannot hold {t_us} us",
                     self.format.as_str()
-                );
+                ));
             }
             // Zero is where the kept part begins.
             (t_us, if shift { t_us.saturating_add(self.start_us) } else { 0 })
@@ -240,34 +240,34 @@ impl Picker {
 
     fn report(&self, out_of_bounds: u64) {
         let left_out = self.seen - self.written - self.early;
-        eprintln!("{} events written", self.written);
+        tell(format!("{} events written", self.written));
         if left_out > 0 {
-            eprintln!("{left_out} events left out by --decimate");
+            tell(format!("{left_out} events left out by --decimate"));
         }
         if self.early > 0 {
-            eprintln!(
+            tell(format!(
                 "{} events left out: their time lies before the first event's, where time begins at zero; other formats, without --rebase, hold it",
                 self.early
-            );
+            ));
         }
         if self.imu_left_out > 0 {
-            eprintln!(
+            tell(format!(
                 "{} inertial samples left out: {} has no place for them, aedat4 has",
                 self.imu_left_out,
                 self.format.as_str()
-            );
+            ));
         }
         if out_of_bounds > 0 {
-            eprintln!("{out_of_bounds} events outside the sensor left out");
+            tell(format!("{out_of_bounds} events outside the sensor left out"));
         }
         if let Some(sorter) = &self.sorter
             && sorter.moved > 0
         {
-            eprintln!(
+            tell(format!(
                 "{} events put into the order of time, which {} needs",
                 sorter.moved,
                 self.format.as_str()
-            );
+            ));
         }
     }
 }

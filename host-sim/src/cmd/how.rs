@@ -11,7 +11,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::span::Span;
 use super::stated::Stated;
-use super::{in_order, note};
+use super::{in_order, note, tell};
 
 /// What is known better than the tachometer finds it, and the memory it is given.
 #[derive(clap::Args)]
@@ -71,7 +71,7 @@ impl How {
         let options = self.stated.into();
         let mut recording = recording::open(file, &options).with_context(|| name.clone())?;
         for assumed in &recording.assumed {
-            eprintln!("{name}: {assumed}");
+            tell(format!("{name}: {assumed}"));
         }
         let plan = Plan {
             settings: Settings { all_stages, ..self.settings(recording.geometry) },
@@ -86,13 +86,13 @@ impl How {
         });
         bar.finish_and_clear();
         if self.gyro && !run.has_gyro {
-            eprintln!("{name}: no gyro samples; speeds are relative to the camera");
+            tell(format!("{name}: no gyro samples; speeds are relative to the camera"));
         }
         // Before what is wrong, as it may be why.
         note(&recording, &name);
         match run.damage {
             Some(damage) if run.events_read == 0 => return Err(damage).context(name),
-            Some(damage) => eprintln!("{name}: {damage}; measured what came before"),
+            Some(damage) => tell(format!("{name}: {damage}; measured what came before")),
             None if run.events_read == 0 && recording.out_of_bounds() > 0 => {
                 let Geometry { width_px, height_px } = recording.geometry;
                 bail!(
@@ -108,11 +108,14 @@ impl How {
             bail!("{name}: no events between --start and --end inside --roi; widen them");
         }
         if run.out_of_order > 0 {
-            eprintln!("{name}: {} events stepped back in time and were left out", run.out_of_order);
+            tell(format!(
+                "{name}: {} events stepped back in time and were left out",
+                run.out_of_order
+            ));
         }
         if run.timeline.is_set_back() {
             let set_back = run.timeline.note();
-            eprintln!("{name}: {set_back}; what follows is measured as if it came then");
+            tell(format!("{name}: {set_back}; what follows is measured as if it came then"));
         }
         in_order(&recording, &name)?;
         let Run { facts, readings, .. } = run;

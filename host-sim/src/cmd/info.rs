@@ -12,8 +12,8 @@ use evtach_core::{Event, Polarity};
 use evtach_host::measure;
 use evtach_host::recording::{self, ImuSample, Recording};
 
-use super::say;
 use super::stated::Stated;
+use super::{say, tell};
 use statistics::{Count, Statistics, Timeline};
 
 /// Arguments of `evtach info`.
@@ -42,7 +42,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let (mut told, mut failed) = (false, false);
     for file in &args.files {
         if let Err(error) = about(file, &args, &mut told) {
-            eprintln!("evtach: {error:#}");
+            tell(format!("evtach: {error:#}"));
             failed = true;
         }
     }

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use evtach_host::measure::{Document, evidence, table};
 
 use super::how::{How, Measured};
-use super::say;
+use super::{say, tell};
 
 /// Arguments of `evtach measure`.
 #[derive(clap::Args)]
@@ -33,7 +33,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         match measure(file, &args) {
             Ok(read) => without |= !read,
             Err(error) => {
-                eprintln!("evtach: {error:#}");
+                tell(format!("evtach: {error:#}"));
                 failed = true;
             }
         }
@@ -52,7 +52,7 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
         say(table(&facts, &summary, &readings))?;
     }
     if args.verbose {
-        eprint!("{}", evidence(&facts, &readings));
+        tell(evidence(&facts, &readings).trim_end());
     }
     Ok(summary.has_speed())
 }

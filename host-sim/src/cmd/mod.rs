@@ -40,13 +40,13 @@ fn keep_apart(input: &Path, output: &Path) -> anyhow::Result<()> {
 /// Says what is to be known of a recording once it is read.
 fn note(recording: &Recording, name: &str) {
     for note in &recording.side().notes {
-        eprintln!("{name}: {note}");
+        tell(format!("{name}: {note}"));
     }
     if recording.out_of_bounds() > 0 {
-        eprintln!(
+        tell(format!(
             "{name}: {} events outside the sensor left out; state its size with --geometry WxH if it is wrong",
             recording.out_of_bounds()
-        );
+        ));
     }
 }
 
@@ -61,12 +61,18 @@ fn in_order(recording: &Recording, name: &str) -> anyhow::Result<()> {
 /// Writes what is whole in memory to a file and says on stdout what it is, or to stdout for "-" and says it on stderr.
 fn deliver(out: &Path, bytes: &[u8], said: &str) -> anyhow::Result<()> {
     if out == Path::new("-") {
-        eprintln!("{said}");
+        tell(said);
         return say(bytes);
     }
     std::fs::write(out, bytes)
         .with_context(|| format!("{}: cannot be written; choose another place", out.display()))?;
     say(format!("{said}\n"))
+}
+
+/// Says something on stderr. Where nobody hears it, or it has no room, that is no reason to stop, as it is to `eprintln!`.
+pub fn tell(line: impl AsRef<str>) {
+    let line = format!("{}\n", line.as_ref());
+    std::io::stderr().write_all(line.as_bytes()).ok();
 }
 
 /// Prints an answer. Where there is no room for it, that is an error as any other; where nobody reads any more, it is none.

@@ -14,7 +14,7 @@ use evtach_host::recording;
 
 use super::span::parse_seconds;
 use super::stated::Stated;
-use super::{deliver, in_order, keep_apart, note};
+use super::{deliver, in_order, keep_apart, note, tell};
 
 /// Arguments of `evtach screen`.
 #[derive(clap::Args)]
@@ -106,17 +106,17 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let mut recording =
         recording::open(&args.file, &args.stated.into()).with_context(|| name.clone())?;
     for assumed in &recording.assumed {
-        eprintln!("{name}: {assumed}");
+        tell(format!("{name}: {assumed}"));
     }
     let mut instrument = Instrument::new(args.preferences());
     let until_us = args.at.map(|seconds| (seconds * 1e6) as u64);
     let played = play(&mut recording, &mut instrument, until_us).with_context(|| name.clone())?;
     if let Some(damage) = played.damage {
-        eprintln!("{name}: {damage}; played what came before");
+        tell(format!("{name}: {damage}; played what came before"));
     }
     if until_us.is_some() && played.is_whole {
         let end_s = played.duration_us as f64 * 1e-6;
-        eprintln!("{name}: ends {end_s:.3} s after its first event, before --at");
+        tell(format!("{name}: ends {end_s:.3} s after its first event, before --at"));
     }
     note(&recording, &name);
     in_order(&recording, &name)?;

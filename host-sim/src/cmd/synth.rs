@@ -22,7 +22,7 @@ use evtach_host::synth::presets::Preset;
 use evtach_host::synth::{Model, Scene, Synthetic, generate};
 use serde_json::Value;
 
-use super::{keep_apart, say};
+use super::{keep_apart, say, tell};
 use args::{BackdropArgs, MotionArgs, RotorArgs, SensorArgs, set};
 
 /// Arguments of `evtach synth`.
@@ -125,16 +125,16 @@ fn write(writer: &mut Writer, made: &Synthetic) -> Result<(), RecordingError> {
 fn report(out: &Path, format: WriteFormat, made: &Synthetic, truth: Option<&Path>) {
     let t = &made.truth;
     let mega = t.events as f64 / t.duration_s / 1e6;
-    eprintln!(
+    tell(format!(
         "{}: {} events in {:.0} ms ({mega:.2} Mev/s), {}, {} lost in the readout",
         out.display(),
         t.events,
         t.duration_s * 1e3,
         format.as_str(),
         t.dropped
-    );
+    ));
     for r in &t.rotors {
-        eprintln!(
+        tell(format!(
             "  {:.2} rpm {} in the room, {} blades, radius {:.0} px at ({:.0}, {:.0})",
             r.rpm_room_mean_signed.abs(),
             r.direction,
@@ -142,14 +142,17 @@ fn report(out: &Path, format: WriteFormat, made: &Synthetic, truth: Option<&Path
             r.radius_px,
             r.centre_px[0],
             r.centre_px[1]
-        );
+        ));
     }
     if !made.gyro.is_empty() && !format.holds_imu() {
         let kept = if truth.is_some() { "in the truth alone" } else { "nowhere" };
-        eprintln!("  gyro samples: {kept}, {} has no place for them; aedat4 has", format.as_str());
+        tell(format!(
+            "  gyro samples: {kept}, {} has no place for them; aedat4 has",
+            format.as_str()
+        ));
     }
     if let Some(path) = truth {
-        eprintln!("  truth: {}", path.display());
+        tell(format!("  truth: {}", path.display()));
     }
 }
 

@@ -15,6 +15,7 @@ use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 
 use super::stated::Stated;
+use super::tell;
 
 /// How often the view is drawn.
 const FRAME: Duration = Duration::from_millis(100);
@@ -60,7 +61,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     shown.context("the terminal failed")?;
     // The view had room for its first words.
     if let Some(failure) = monitor.failure() {
-        eprintln!("{name}: {failure}");
+        tell(format!("{name}: {failure}"));
     }
     // Where a speed was seen before, what failed then is told, but the speed stands.
     Ok(ExitCode::from(match (monitor.seen_speed(), monitor.failure()) {

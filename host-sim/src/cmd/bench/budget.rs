@@ -12,6 +12,8 @@ use evtach_firmware::sensor::spi::{Bridge, Kind};
 use evtach_host::device::{self, Image, Used};
 use evtach_host::synth::{self, Rotor, Scene};
 
+use crate::cmd::tell;
+
 /// Arguments of `evtach bench budget`.
 #[derive(clap::Args)]
 pub struct Args {
@@ -39,7 +41,7 @@ const TOLD_AFTER_S: f64 = 0.25;
 
 /// Runs the subcommand.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    eprintln!("building the firmware");
+    tell("building the firmware");
     let image = device::build()?;
     let one = vec![Rotor { blades: 3, rpm: 1000.0, radius_px: 42.0, ..Rotor::default() }];
     let used = play(&image, "one rotor", one, args.seconds)?;
@@ -73,7 +75,7 @@ fn play(image: &Image, name: &str, rotors: Vec<Rotor>, seconds: u32) -> anyhow::
     let rotors = at_that_rate(rotors)?;
     let rpm: Vec<_> = rotors.iter().map(|rotor| format!("{:.0}", rotor.rpm)).collect();
     let (stream, rate) = stream(rotors, f64::from(seconds))?;
-    eprintln!("running it in QEMU");
+    tell("running it in QEMU");
     let used = device::run_instrument(image, &stream, seconds)?;
     println!(
         "{name}, {} rpm, {:.2} Mev/s, screen at 4 Hz, every reading told over the link",

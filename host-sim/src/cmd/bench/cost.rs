@@ -16,6 +16,8 @@ use evtach_host::device::{
 use evtach_host::recording::{self, OpenOptions};
 use evtach_host::synth::{self, Rotor, Scene};
 
+use crate::cmd::tell;
+
 /// Arguments of `evtach bench cost`.
 #[derive(clap::Args)]
 pub struct Args {
@@ -41,14 +43,14 @@ struct Played {
 
 /// Runs the subcommand.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    eprintln!("building the firmware");
+    tell("building the firmware");
     let image = device::build()?;
     let (mut memory, mut past) = (None, Vec::new());
     for played in recordings(&args.files)? {
         if let Some(path) = &args.keep {
             device::write_recording(path, played.geometry, &played.events)?;
         }
-        eprintln!("playing {} in QEMU", played.name);
+        tell(format!("playing {} in QEMU", played.name));
         let output = device::run(&image, played.geometry, &played.events, Pace::File)?;
         let spent = Spent::of(&output);
         print_run(&played, &output, &spent);

@@ -9,6 +9,7 @@ use anyhow::Context as _;
 use evtach_host::device;
 
 use super::budget::{ASKED_FLASH_BYTES, ASKED_RAM_BYTES};
+use crate::cmd::tell;
 
 /// Arguments of `evtach bench image`.
 #[derive(clap::Args)]
@@ -24,7 +25,7 @@ const RECORDING_BYTES: u64 = 7 << 20;
 
 /// Runs the subcommand.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    eprintln!("building the firmware");
+    tell("building the firmware");
     let image = device::build_for_board()?;
     println!("{}", image.path.display());
     let ram_bytes = image.ram_bytes + image.stack_bytes;

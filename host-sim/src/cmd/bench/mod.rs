@@ -21,6 +21,8 @@ mod cost;
 
 use std::process::ExitCode;
 
+use super::tell;
+
 /// Arguments of `evtach bench`.
 #[derive(clap::Args)]
 pub struct Args {
@@ -102,7 +104,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     }
     // Not to stdout, which may hold records for a program.
     for short in &report.short {
-        eprintln!("{short}");
+        tell(short);
     }
     Ok(if report.short.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

@@ -27,6 +27,7 @@ use super::drive::{Capacity, readings};
 use super::report::{Report, progress};
 use super::score::{Score, Scores, is_wrong, score};
 use super::spec;
+use crate::cmd::tell;
 
 /// Counts the changes of [`scenes`]: results of different scenes must not be mixed in one file.
 const SCENES_VERSION: u32 = 2;
@@ -136,7 +137,7 @@ pub fn run(args: &Args) -> anyhow::Result<Report> {
     let done: BTreeSet<u64> = known.iter().map(|t| t.trial).collect();
     let todo: Vec<u64> = wanted.clone().filter(|t| !done.contains(t)).collect();
     if !done.is_empty() {
-        eprintln!("{}: {} scenes done, {} to go", args.file.display(), done.len(), todo.len());
+        tell(format!("{}: {} scenes done, {} to go", args.file.display(), done.len(), todo.len()));
     }
     let sink = if args.common.quick {
         None
