@@ -3,7 +3,7 @@
 use evtach_core::{Event, Settings, Tachometer};
 use evtach_firmware::instrument::{Instrument, Picture, Sensor, Traffic};
 
-use crate::measure::{Capacity, drain, feed, with_tachometer};
+use crate::measure::{Capacity, Since, drain, feed, with_tachometer};
 use crate::recording::{Recording, RecordingError};
 
 /// How often the instrument is told the time.
@@ -39,25 +39,28 @@ pub fn play(
         let mut player =
             Player { tachometer, instrument, traffic: Traffic::default(), picture_us: None };
         let mut chunk: Vec<Event> = Vec::new();
-        let (mut first_us, mut played) =
-            (None, Played { duration_us: 0, is_whole: true, damage: None });
+        let mut since = Since::default();
+        let mut played = Played { duration_us: 0, is_whole: true, damage: None };
         loop {
             chunk.clear();
             let read = recording.read_chunk(&mut chunk);
-            if let Some(first) = chunk.first() {
-                let first_us = *first_us.get_or_insert(first.t_us);
-                let since_us = |event: &Event| event.t_us.saturating_sub(first_us);
-                if let Some(until_us) = until_us {
-                    let wanted = chunk.partition_point(|event| since_us(event) <= until_us);
-                    played.is_whole &= wanted == chunk.len();
-                    chunk.truncate(wanted);
+            let before = chunk.len();
+            chunk.retain(|event| {
+                let since_us = since.of(event);
+                let is_wanted = until_us.is_none_or(|until_us| since_us <= until_us);
+                if is_wanted {
+                    played.duration_us = played.duration_us.max(since_us);
                 }
-                let latest_us = chunk.last().map_or(0, since_us);
-                played.duration_us = played.duration_us.max(latest_us);
-            }
+                is_wanted
+            });
+            let cut = before > 0 && chunk.is_empty();
+            played.is_whole &= chunk.len() == before;
             player.lost(recording.lost());
             player.events(&chunk);
-            let cut = until_us.is_some() && chunk.is_empty();
+            if recording.starts_anew() {
+                since.start_anew();
+                player.tachometer.configure(settings);
+            }
             match read {
                 Ok(true) if !cut => {}
                 Ok(_) => break,

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context, bail};
-use evtach_core::{Event, Roi};
-use evtach_host::measure::LONGEST_WAIT_US;
+use evtach_core::{Event, Polarity, Roi};
+use evtach_host::measure::{LONGEST_WAIT_US, Since, Timeline};
 use evtach_host::recording::write::{self, WriteFormat};
 use evtach_host::recording::{self, ImuSample};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -81,6 +81,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             .write_imu(&picker.take_imu(&mut samples))
             .and_then(|()| writer.write(&picked))
             .with_context(|| args.output.display().to_string())?;
+        if recording.starts_anew() {
+            picker.start_anew();
+        }
         bar.set_position(recording.bytes_read());
         if !more {
             break;
@@ -121,8 +124,15 @@ struct Picker {
     rebase: bool,
     latest_us: u64,
     format: WriteFormat,
-    /// Time of the first event, and what is taken off every time.
-    origin: Option<(u64, u64)>,
+    /// Whether only a part is to be kept.
+    is_part: bool,
+    since: Since,
+    /// The clock of the inertial samples, which need not come with the events of their time.
+    imu_timeline: Timeline,
+    /// Time of the first event.
+    first_us: Option<u64>,
+    /// What is taken off every time, once an event of the part that is kept has come.
+    shift_us: Option<u64>,
     seen: u64,
     written: u64,
     /// Events whose time would lie before zero.
@@ -148,7 +158,11 @@ impl Picker {
             rebase: args.rebase,
             latest_us,
             format,
-            origin: None,
+            is_part: args.roi.is_some() || !args.span.is_all(),
+            since: Since::default(),
+            imu_timeline: Timeline::default(),
+            first_us: None,
+            shift_us: None,
             seen: 0,
             written: 0,
             early: 0,
@@ -159,23 +173,28 @@ impl Picker {
         }
     }
 
+    /// Says that what comes next is another recording.
+    const fn start_anew(&mut self) {
+        self.since.start_anew();
+    }
+
     /// So many events behind the end are no wrong times among right ones.
     const MOST_BEYOND: u64 = 65_536;
 
     /// Takes in events; `false` when none behind them will be wanted.
     fn take(&mut self, events: &[Event], out: &mut Vec<Event>) -> bool {
         for event in events {
-            let (first_us, shift_us) = self.origin(event.t_us);
-            let since_us = event.t_us.saturating_sub(first_us);
+            self.first_us.get_or_insert(event.t_us);
+            let since_us = self.since.of(event);
             // Recorders write inertial samples behind the events of their time.
             let is_beyond = since_us.saturating_sub(self.end_us) > LONGEST_WAIT_US;
             self.beyond = if is_beyond { self.beyond + 1 } else { 0 };
             self.is_past_end = since_us >= self.end_us;
-            if self.is_past_end {
+            if self.is_past_end || since_us < self.start_us {
                 continue;
             }
-            let inside = self.roi.is_none_or(|roi| roi.contains(event.x, event.y));
-            if since_us < self.start_us || !inside {
+            let shift_us = self.shift_us(event.t_us, since_us - self.start_us);
+            if self.roi.is_some_and(|roi| !roi.contains(event.x, event.y)) {
                 continue;
             }
             self.seen += 1;
@@ -199,12 +218,20 @@ impl Picker {
         self.beyond < Self::MOST_BEYOND
     }
 
-    /// The inertial samples of the part that is wanted. They wait for the first event, which says when it begins.
+    /// The inertial samples of the part that is wanted. They wait for its first event, which says when it begins.
     fn take_imu(&mut self, samples: &mut Vec<ImuSample>) -> Vec<ImuSample> {
-        let Some((first_us, shift_us)) = self.origin else { return Vec::new() };
+        let (Some(first_us), Some(shift_us)) = (self.first_us, self.shift_us) else {
+            return Vec::new();
+        };
         let from_us = if self.start_us > 0 { first_us.saturating_add(self.start_us) } else { 0 };
         let wanted_us = from_us..first_us.saturating_add(self.end_us);
-        let wanted = samples.drain(..).filter(|sample| wanted_us.contains(&sample.t_us));
+        let at =
+            |sample: &ImuSample| Event { t_us: sample.t_us, x: 0, y: 0, polarity: Polarity::On };
+        let times: Vec<Event> = samples.iter().map(at).collect();
+        let mut is_wanted = Vec::new();
+        self.imu_timeline.lay(&times, |laid| is_wanted.push(wanted_us.contains(&laid.t_us)));
+        let wanted =
+            samples.drain(..).zip(is_wanted).filter_map(|(sample, is)| is.then_some(sample));
         let mut wanted: Vec<ImuSample> = wanted
             .filter_map(|sample| {
                 Some(ImuSample { t_us: sample.t_us.checked_sub(shift_us)?, ..sample })
@@ -217,8 +244,9 @@ impl Picker {
         wanted
     }
 
-    fn origin(&mut self, t_us: u64) -> (u64, u64) {
-        *self.origin.get_or_insert_with(|| {
+    /// What is taken off every time, as told by the first event of the part that is kept, so long after it begins.
+    fn shift_us(&mut self, t_us: u64, since_start_us: u64) -> u64 {
+        *self.shift_us.get_or_insert_with(|| {
             // A minute of headroom: the recording goes on from its first event.
             let shift = self.rebase || t_us.saturating_add(60_000_000) > self.latest_us;
             if shift && !self.rebase {
@@ -228,7 +256,7 @@ impl Picker {
                 ));
             }
             // Zero is where the kept part begins.
-            (t_us, if shift { t_us.saturating_add(self.start_us) } else { 0 })
+            if shift { t_us.saturating_sub(since_start_us) } else { 0 }
         })
     }
 
@@ -241,6 +269,11 @@ impl Picker {
     fn report(&self, out_of_bounds: u64) {
         let left_out = self.seen - self.written - self.early;
         tell(format!("{} events written", self.written));
+        if self.seen == 0 && self.is_part {
+            tell(
+                "note: nothing is kept: no event lies between --start and --end inside --roi; widen them",
+            );
+        }
         if left_out > 0 {
             tell(format!("{left_out} events left out by --decimate"));
         }

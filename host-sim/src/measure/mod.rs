@@ -4,6 +4,7 @@ mod json;
 mod letters;
 mod mean;
 mod run;
+mod since;
 mod summary;
 mod table;
 mod ties;
@@ -22,6 +23,7 @@ use ties::Ties;
 
 pub use json::{Document, FileFacts, PROGRAM, ReadingRow, RotorRow, SettingsRow, letter};
 pub use run::{Plan, Run};
+pub use since::Since;
 pub use summary::{Summary, summarise};
 pub use table::{evidence, table};
 pub use timeline::Timeline;

@@ -4,7 +4,7 @@ use evtach_core::{CLOCK_RESET_US, Event, GyroSample, Reading};
 
 /// Lays the parts of a stream end to end: where its clock is set back, the tachometer begins anew, and what follows would seem to
 /// lie before, or within, what came.
-#[derive(Debug, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Timeline {
     /// What is added to the clock's time in this part.
     shift_us: u64,

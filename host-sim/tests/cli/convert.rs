@@ -101,6 +101,43 @@ fn a_part_of_a_recording() {
     assert!(run.stdout == lines(expected), "{}", run.stderr);
 }
 
+/// Behind a break of the clock `convert`, `measure` and `screen` count on from the first event.
+#[test]
+fn a_part_behind_a_clock_that_is_set_back() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let events = rotor();
+    let ahead = events.iter().map(|event| Event { t_us: event.t_us + 5_000_000, ..*event });
+    let set_back: Vec<Event> = ahead.chain(events.iter().copied()).collect();
+    let csv = file(&folder, "set_back.csv", WriteFormat::Csv, &set_back);
+    // By less than a clock is set back by, but as another recording.
+    let one = std::fs::read(file(&folder, "one.raw", WriteFormat::Evt3, &events));
+    let one = one.expect("what was written");
+    let two = folder.path().join("two.raw").display().to_string();
+    std::fs::write(&two, [one.as_slice(), &one].concat()).expect("room on the disk");
+    let (first_us, last_us) = (events[0].t_us, events[events.len() - 1].t_us);
+    let seconds = |us: u64| format!("{:.6}", (last_us - first_us + us) as f64 * 1e-6);
+    let (start, end) = (seconds(20_000), seconds(90_000));
+    let inside = |event: &&Event| (20_000..90_000).contains(&(event.t_us - first_us));
+    let part: Vec<Event> = events.iter().filter(inside).copied().collect();
+    for from in [&csv, &two] {
+        let of_part = ["--geometry", "200x160", "--start", &start, "--end", &end];
+        let convert = ["convert", from, "-", "--to", "csv"];
+        let run = evtach(&[&convert[..], &of_part].concat(), b"");
+        assert!(run.stdout == lines(part.iter().copied()), "{from}: {}", run.stderr);
+        let run = evtach(&[&convert[..], &of_part, &["--rebase"]].concat(), b"");
+        let began_us = first_us + 20_000;
+        let rebased = part.iter().map(|event| Event { t_us: event.t_us - began_us, ..*event });
+        assert!(run.stdout == lines(rebased), "{from}: {}", run.stderr);
+        let run = evtach(&[&["measure", "--json", from][..], &of_part].concat(), b"");
+        assert!(run.stdout.contains(&format!("\"events\":{},", part.len())), "{}", run.stdout);
+        let out = folder.path().join("at.png").display().to_string();
+        let run = evtach(&["screen", "--geometry", "200x160", "--at", &end, from, &out], b"");
+        assert!(run.code != Some(2) && !run.stderr.contains("before --at"), "{}", run.stderr);
+        let run = evtach(&[&convert[..], &["--geometry", "200x160", "--start", "9"]].concat(), b"");
+        assert!(run.stderr.contains("widen them"), "{}", run.stderr);
+    }
+}
+
 #[test]
 fn a_wrong_time_among_right_ones_loses_nothing_unsaid() {
     let folder = TempDir::new().expect("a temporary folder");
