@@ -241,18 +241,23 @@ fn clock_that_starts_again() {
 #[test]
 fn recordings_put_behind_each_other() {
     let folder = folder();
-    let one = std::fs::read(write(&folder, "one.raw", &rotor())).expect("the file just written");
-    let path = folder.path().join("two.raw");
-    std::fs::write(&path, [one.as_slice(), &one].concat()).expect("room on the disk");
     let (count, lasts_us) = (rotor().len(), rotor().last().map_or(0, |event| event.t_us));
-    let run = measure(&path);
-    assert_eq!(run.code, Some(0), "{}", run.stderr);
-    assert_reads_the_rotor(&run.stdout);
-    assert!(run.stderr.contains("another recording begins at byte"), "{}", run.stderr);
-    assert!(!run.stderr.contains("stepped back in time"), "{}", run.stderr);
-    let both = format!(" {:.3} s, {} events", 2e-6 * lasts_us as f64, 2 * count);
-    assert!(run.stdout.contains(&both), "{both}: {}", run.stdout);
-    assert!(run.stdout.contains(" 0 lost)"), "{}", run.stdout);
+    let raw = write(&folder, "one.raw", &rotor());
+    let text = csv(&folder, "one.csv", HEAD, &rotor());
+    for (one, name, border) in [(raw, "two.raw", "byte"), (text, "two.csv", "line")] {
+        let one = std::fs::read(one).expect("the file just written");
+        let path = folder.path().join(name);
+        std::fs::write(&path, [one.as_slice(), &one].concat()).expect("room on the disk");
+        let run = measure(&path);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        assert_reads_the_rotor(&run.stdout);
+        let told = format!("another recording begins at {border}");
+        assert!(run.stderr.contains(&told), "{}", run.stderr);
+        assert!(!run.stderr.contains("stepped back in time"), "{}", run.stderr);
+        let both = format!(" {:.3} s, {} events", 2e-6 * lasts_us as f64, 2 * count);
+        assert!(run.stdout.contains(&both), "{both}: {}", run.stdout);
+        assert!(run.stdout.contains(" 0 lost)"), "{}", run.stdout);
+    }
 }
 
 #[test]

@@ -56,7 +56,7 @@ impl Source for Text {
         if bytes.is_empty() {
             return Ok(false);
         }
-        let whole = match memchr::memrchr(b'\n', bytes) {
+        let mut whole = match memchr::memrchr(b'\n', bytes) {
             Some(end) => end + 1,
             None if last => bytes.len(),
             None => {
@@ -84,6 +84,9 @@ impl Source for Text {
                 // The names again: another recording was put behind the one before.
                 Err(_) if layout::names_columns(line) => {
                     side.notes.push(format!("another recording begins at line {}", self.line));
+                    side.starts_anew = true;
+                    whole = start;
+                    break;
                 }
                 // The last line of a cut file.
                 Err(_) if end == bytes.len() && last => {
