@@ -46,7 +46,7 @@ enum Stage {
     Newton,
     Scan,
     Doubt,
-    Arc,
+    Around,
     Symmetry,
     Overtone,
     Recovery,
@@ -204,7 +204,7 @@ impl Measurement {
             Stage::Newton => self.newton(window, polar),
             Stage::Scan => self.scan(polar, angular),
             Stage::Doubt => self.doubt(window, polar, angular, even),
-            Stage::Arc => self.arc(settings, polar),
+            Stage::Around => self.around(settings, polar),
             Stage::Symmetry => self.symmetry(settings, polar, angular),
             Stage::Overtone => self.overtone(polar, angular),
             Stage::Recovery => self.recovery(window, polar),
@@ -229,7 +229,7 @@ impl Measurement {
     pub const fn stage(&self) -> &'static str {
         match self.stage {
             Stage::Track | Stage::Newton => "centre",
-            Stage::Scan | Stage::Doubt | Stage::Arc => "scan",
+            Stage::Scan | Stage::Doubt | Stage::Around => "scan",
             Stage::Symmetry | Stage::Overtone => "symmetry",
             Stage::Recovery => "recovery",
             Stage::Pose => "pose",

@@ -1,6 +1,7 @@
 //! Rotational speed estimation (paper, section "Rotational Speed Estimation").
 
 pub mod angular;
+pub mod around;
 pub mod baseline;
 pub mod filling;
 pub mod folding;

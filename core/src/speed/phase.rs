@@ -13,17 +13,11 @@ use super::angular::{AngularSums, DIRECTIONS};
 use super::polar::PolarEvent;
 use crate::math::{TAU, Turn, TurnRate, larger, quick_sqrt, sqrt};
 use crate::rotors::Disc;
-use crate::settings::Roi;
 
 /// Rings between centre and rim, each for both polarities: the innermost, within a rotor's inner edge, and those that a [`scan`] tells
 /// apart.
 const RINGS: usize = super::angular::BANKS / 2 + 1;
 const BANKS: usize = 2 * RINGS;
-
-/// Sum of the cosines of unrelated phases that none reach by chance, over the root of their number: four standard deviations. And the least
-/// number that tells.
-const STANDS_OUT: f32 = 2.83;
-const LEAST_BESIDE: f32 = 16.0;
 
 /// Phases of the rotor's pattern by ring and polarity.
 #[derive(Clone, Copy, Debug, Default)]
@@ -39,6 +33,18 @@ fn bank(event: PolarEvent, disc: Disc) -> usize {
 
 fn phase(event: PolarEvent, rate: TurnRate, harmonic: u32) -> Turn {
     event.angle().minus(rate.after(event.t_us)).times(harmonic)
+}
+
+/// Sine and cosine of what an event is ahead of its ring's phase. Not inlined: flash is short.
+#[inline(never)]
+pub(super) fn ahead(
+    event: PolarEvent,
+    disc: Disc,
+    rate: TurnRate,
+    harmonic: u32,
+    turns: &[Turn; BANKS],
+) -> (f32, f32) {
+    phase(event, rate, harmonic).minus(turns[bank(event, disc)]).sin_cos()
 }
 
 impl Pattern {
@@ -74,45 +80,6 @@ impl Pattern {
         in_step / total.max(1.0)
     }
 
-    /// Whether the events keep step on one side of the centre only: in the half of all directions opposite to where most do, they keep no more
-    /// step than unrelated ones, or there are too few to tell, although that lies in `view`. Cost: about 450 instructions an event.
-    #[must_use]
-    // Not inlined: flash is short.
-    #[inline(never)]
-    pub fn is_arc(
-        track: &[PolarEvent],
-        disc: Disc,
-        omega_rad_s: f32,
-        harmonic: u32,
-        view: Roi,
-    ) -> bool {
-        let turns = Self::learn(track, disc, omega_rad_s, harmonic).turns();
-        let rate = TurnRate::from_rad_s(omega_rad_s);
-        // Where they lie, as much as they keep step; then what lies on the other side.
-        let (mut x, mut y) = (0.0, 0.0);
-        let (mut sum, mut count) = (0.0, 0.0);
-        for beside in [false, true] {
-            for event in track {
-                let psi = phase(*event, rate, harmonic).minus(turns[bank(*event, disc)]);
-                let in_step = psi.sin_cos().1;
-                let (sin, cos) = event.angle().sin_cos();
-                if !beside {
-                    (x, y) = (x + in_step * cos, y + in_step * sin);
-                } else if x * cos + y * sin < 0.0 {
-                    sum += in_step;
-                    count += 1.0;
-                }
-            }
-        }
-        if count > LEAST_BESIDE {
-            return sum < STANDS_OUT * sqrt(count);
-        }
-        // Nothing is seen there: it should be, unless it would lie outside the picture.
-        let per_length = Disc::MEAN_RADIUS * disc.radius_px / sqrt(x * x + y * y);
-        let (x_px, y_px) = (disc.x_px - per_length * x, disc.y_px - per_length * y);
-        x_px >= 0.0 && y_px >= 0.0 && view.contains(x_px as u16, y_px as u16)
-    }
-
     /// Adds its sums to those of others.
     pub fn add_to(&self, sums: &mut [Complex32]) {
         for (sum, (re, im)) in sums.iter_mut().zip(self.sums) {
@@ -128,12 +95,19 @@ impl Pattern {
             along += sum.re * re + sum.im * im;
             across += sum.re * im - sum.im * re;
         }
-        Turn::of_vector(across, along)
+        direction((along, across))
     }
 
-    fn turns(&self) -> [Turn; BANKS] {
-        self.sums.map(|(re, im)| Turn::of_vector(im, re))
+    /// The phases by ring and polarity.
+    pub(super) fn turns(&self) -> [Turn; BANKS] {
+        self.sums.map(direction)
     }
+}
+
+/// Direction of a sum of (cosines, sines). Not inlined: flash is short.
+#[inline(never)]
+pub(super) fn direction((x, y): (f32, f32)) -> Turn {
+    Turn::of_vector(y, x)
 }
 
 /// Highest angular harmonic that a [`scan`] tries.
@@ -256,8 +230,7 @@ pub fn newton(
     let (mut levers, mut products, mut right) = ([0.0_f32; 3], [0.0_f32; 6], [0.0_f32; 4]);
     let mut in_step = 0.0;
     for event in track {
-        let psi = phase(*event, rate, harmonic).minus(turns[bank(*event, disc)]);
-        let (sin_psi, cos_psi) = psi.sin_cos();
+        let (sin_psi, cos_psi) = ahead(*event, disc, rate, harmonic, &turns);
         let (sin, cos) = event.angle().sin_cos();
         let per_r = disc.radius_px / larger(event.radius_px(), 1.0);
         let (x, y, t) = (-sin * per_r, cos * per_r, event.t_us as f32 * per_us);
@@ -286,32 +259,37 @@ pub fn newton(
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::speed::polar::Annulus;
 
     extern crate std;
     use std::vec::Vec;
 
-    const DISC: Disc = Disc { x_px: 100.0, y_px: 100.0, radius_px: 40.0 };
+    pub const DISC: Disc = Disc { x_px: 100.0, y_px: 100.0, radius_px: 40.0 };
+
+    /// An event at a place beside the centre, if it lies in the annulus.
+    pub fn seen_at(x_px: f32, y_px: f32, t_us: i32) -> Option<PolarEvent> {
+        let mut event = PolarEvent::default();
+        event.t_us = t_us;
+        event.seen_from(-x_px, -y_px, &Annulus::of(DISC))
+    }
 
     /// Events of a pattern of so many windings that keeps step with a frequency, every third of them anywhere.
-    fn pattern(windings: i32, line_hz: f32) -> Vec<PolarEvent> {
-        let annulus = Annulus::of(DISC);
+    pub fn pattern(windings: i32, line_hz: f32) -> Vec<PolarEvent> {
         let mut state = 1_u32;
         let mut random = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (state >> 8) as f32 / (1 << 24) as f32
         };
         let event = |index: i32| {
-            let mut event = PolarEvent::default();
-            event.t_us = (150_000.0 * random()) as i32 - 75_000;
+            let t_us = (150_000.0 * random()) as i32 - 75_000;
             let winding = (windings.unsigned_abs() as f32 * random()) as i32 as f32;
-            let turns = line_hz * event.t_us as f32 * 1e-6 + winding + 0.1 * random();
+            let turns = line_hz * t_us as f32 * 1e-6 + winding + 0.1 * random();
             let turns = if index % 3 == 0 { random() } else { turns / windings as f32 };
             let (sin, cos) = Turn((turns.rem_euclid(1.0) * 4_294_967_296.0) as u32).sin_cos();
             let r_px = DISC.radius_px * (0.3 + 0.7 * random());
-            event.seen_from(-r_px * cos, -r_px * sin, &annulus)
+            seen_at(r_px * cos, r_px * sin, t_us)
         };
         (0..3_000).filter_map(event).collect()
     }
@@ -330,26 +308,5 @@ mod tests {
             assert!(share > 0.5 && (found.share - share).abs() < 0.01, "{share} {found:?}");
             assert!(found.rival_share < 0.15, "{found:?}");
         }
-    }
-
-    #[test]
-    fn an_arc_keeps_step_on_one_side_only() {
-        let (windings, line_hz) = (3, 120.0);
-        let omega_rad_s = line_hz * TAU / windings as f32;
-        let view = Roi { x: 0, y: 0, width_px: 200, height_px: 200 };
-        let in_view =
-            |track: &[PolarEvent], view| Pattern::is_arc(track, DISC, omega_rad_s, 3, view);
-        let is_arc = |track: &[PolarEvent]| in_view(track, view);
-        let whole = pattern(windings, line_hz);
-        assert!(!is_arc(&whole));
-        let right = |event: &&PolarEvent| event.angle().sin_cos().1 > 0.3;
-        let arc: Vec<_> = whole.iter().filter(right).copied().collect();
-        // With nothing beside it, an arc may as well be a rotor that is partly outside the picture, where that ends there.
-        assert!(is_arc(&arc));
-        assert!(!in_view(&arc, Roi { x: DISC.x_px as u16, ..view }));
-        let unrelated = pattern(windings, 777.0);
-        let beside = unrelated.iter().filter(|event| !right(event)).copied();
-        let before_noise: Vec<_> = arc.into_iter().chain(beside).collect();
-        assert!(is_arc(&before_noise));
     }
 }

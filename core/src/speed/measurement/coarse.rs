@@ -9,10 +9,11 @@ use crate::reading::{Reason, Speed, Status};
 use crate::registration::Icp;
 use crate::settings::Settings;
 use crate::speed::angular::AngularSums;
+use crate::speed::around::Around;
 use crate::speed::baseline::Estimate;
 use crate::speed::initial::{Ladder, median};
 use crate::speed::path::Path;
-use crate::speed::phase::{Pattern, newton, scan};
+use crate::speed::phase::{newton, scan};
 use crate::speed::polar::{PolarEvent, PolarTrack};
 use crate::speed::symmetry::{LEAST_ALIKE, mark_harmonic, symmetry, turn_back};
 use crate::store::{WINDOW_SEGMENTS, Window};
@@ -26,6 +27,8 @@ const MOST_STANDING: f32 = 0.8;
 /// The same of the rival of what shows on less than half of its way around: that of half has 0.64. So has one whose blades show more there than
 /// elsewhere, against what is behind or to a busy readout, but what there is of it keeps step all around.
 const RIVAL_OF_ARC: f32 = 0.7;
+/// The same from which on a rotor may be tilted so much that another harmonic than its own keeps step best: those have 0.49 and more.
+const RIVAL_OF_TILT: f32 = 0.4;
 /// Pixels along the rim from one blade to the next below which there are none to be seen: what keeps step is a lamp's light.
 const LEAST_APART_PX: f32 = 5.0;
 /// Two coarse speeds contradict each other when they differ by more than half the way to the next speed that the line
@@ -126,12 +129,17 @@ impl Measurement {
         self.other_windings =
             [scan.still_share, scan.mirror_share].map(|share| share / scan.share.max(1e-3));
         self.windings = self.harmonic;
-        self.stage = if rival > RIVAL_OF_ARC { Stage::Arc } else { Stage::Symmetry };
+        self.stage = if rival > RIVAL_OF_TILT { Stage::Around } else { Stage::Symmetry };
     }
 
-    /// Whether it shows on less than half of its way around: then it may be part of something larger.
-    pub(super) fn arc(&mut self, settings: &Settings, polar: &[PolarEvent]) {
-        if Pattern::is_arc(polar, self.disc, self.omega_rad_s, self.harmonic, settings.view()) {
+    /// Whether it shows on less than half of its way around: then it may be part of something larger. And whether it is tilted so much that
+    /// the harmonic is that of some sides of it, where its blades seem slow and close together, or fast and far apart: then the phases
+    /// make other turns all around. One that is not seen well enough in every direction is believed.
+    pub(super) fn around(&mut self, settings: &Settings, polar: &[PolarEvent]) {
+        let around = Around::learn(polar, self.disc, self.omega_rad_s, self.harmonic);
+        let arc = self.standing() > RIVAL_OF_ARC && around.is_arc(settings.view());
+        let tilted = around.turns_beyond().is_some_and(|turns| turns != 0);
+        if arc || tilted {
             return self.refuse(Reason::Ambiguous);
         }
         self.stage = Stage::Symmetry;

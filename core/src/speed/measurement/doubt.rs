@@ -220,7 +220,8 @@ impl Measurement {
         self.standing() > SMALL_DOUBTFUL
     }
 
-    fn standing(&self) -> f32 {
+    /// Share in step of another harmonic over that of the best.
+    pub(super) fn standing(&self) -> f32 {
         self.evidence.scan_standing.unwrap_or(0.0)
     }
 
