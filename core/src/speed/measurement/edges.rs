@@ -129,6 +129,11 @@ impl Measurement {
         self.too_fast_for_edges() || blur_px < self.blur_px(LEAST_BLUR, MOST_JITTER_S)
     }
 
+    /// The same with noise and jitter as no excuse.
+    pub(super) fn clearly_sharp(&self) -> bool {
+        self.pose.sharpness_px() < share_px(LEAST_BLUR, self.disc.radius_px)
+    }
+
     /// Whether the path of a motor that hunts, which is followed, leaves its edges blurred, and the finer harmonic that the window before
     /// kept step with out of step: it went astray. Measured afresh, the rotor is found again.
     pub(super) fn strayed(&self) -> bool {

@@ -57,8 +57,8 @@ const COARSE_SPREAD: f32 = 0.5;
 const MOST_ERROR: f32 = 0.01;
 const COARSE_SIGMAS: f32 = 3.0;
 const LOCK_FITS_SIGMAS: f32 = 2.5;
-/// Standard error of a coarse reading of less than three blades, as a share of how much its speed seems to swing; and what of that
-/// counts as error of a mark's lock before a hand that sways as fast as the mark turns.
+/// Standard error of a coarse reading as a share of how much its speed seems to swing; and what of that counts as error of a mark's lock
+/// before a hand that sways as fast as the mark turns.
 const UNEVEN_SHARE: f32 = 0.5;
 const MARK_SWING: f32 = 0.35;
 /// The largest relative error where the stream ended before its first window was full: no other will tell.
@@ -259,10 +259,18 @@ impl Measurement {
         scatter_rad > MOST_SLIP * TAU + self.scatter_rad()
     }
 
-    /// Whether the lock of a single mark may be farther off than any reading may be. Then the phase stands alone, which takes what a hand
-    /// moves the axis by for the mark's own turn.
+    /// Whether the lock of what may stray may be farther off than any reading may be. Then the phase stands alone, which takes what a hand
+    /// moves the axis by for a mark's own turn, or that of blurred edges.
     fn is_vague(&self, lock: Estimate) -> bool {
-        self.parts == Some(1) && lock.sigma_rad_s > MOST_ERROR * lock.omega_rad_s.abs()
+        (self.parts == Some(1) || self.may_stray())
+            && lock.sigma_rad_s > MOST_ERROR * lock.omega_rad_s.abs()
+    }
+
+    /// Whether the path may have gone astray in a hand: edges are blurred, noise and all. Those of a motor that hunts are not, along its own.
+    // Not inlined: flash is short.
+    #[inline(never)]
+    fn may_stray(&self) -> bool {
+        self.drift_px_s > STILL_PX_S && !self.clearly_sharp()
     }
 
     /// Adds half of what the witnesses of the lock are apart where that is more than their own scatter explains: the truth may be with
@@ -378,8 +386,8 @@ impl Measurement {
     /// what the camera may turn by.
     fn widen_coarse(&mut self, window: &Window<'_>, stretch: f32, roll_rad_s: f32) {
         self.widen_mark(SHAKE_PX);
-        if self.may_be_mark() || self.parts == Some(2) {
-            // It may be tilted: then it seems to turn unevenly, and parts of a turn tell another speed than whole ones.
+        if self.may_be_mark() || self.parts == Some(2) || self.may_stray() {
+            // Two blades may be tilted: then they seem to turn unevenly, and parts of a turn tell another speed than whole ones.
             let swing_rad_s = UNEVEN_SHARE * self.evidence.swing_rad_s.unwrap_or(0.0);
             self.estimate.sigma_rad_s = root_sum_square(self.estimate.sigma_rad_s, swing_rad_s);
         }
