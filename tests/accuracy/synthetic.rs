@@ -127,6 +127,32 @@ fn scenes_without_rotors() {
     assert!(failures.is_empty(), "\n{}", failures.join("\n"));
 }
 
+/// Both edges of a mark look alike where all events have one polarity: half of its width to either side is no blur. What is shaken is no
+/// mark all the same.
+#[test]
+fn marks_without_polarity() {
+    let mut failures = Vec::new();
+    let without_polarity =
+        |scene: Scene| Scene { sensor: Sensor { all_on: true, ..scene.sensor }, ..scene };
+    for shape in [Shape::Dot, Shape::Straight] {
+        for rpm in [600.0, -1500.0, 3000.0] {
+            let mut scene = Scene { seed: 31, duration_ms: 400.0, ..Preset::Dot.scene() };
+            scene.rotors[0].shape = shape;
+            scene.rotors[0].rpm = rpm;
+            let told = wrong(&format!("{shape:?}"), &without_polarity(scene));
+            // Its edges may as well be those of two blades.
+            failures.extend(told.into_iter().filter(|what| !what.ends_with("blades read as None")));
+        }
+    }
+    for preset in [Preset::Still, Preset::Flicker, Preset::Bar, Preset::Noise] {
+        let mut scene = Scene { seed: 31, ..preset.scene() };
+        failures.extend(wrong(&format!("{preset:?}"), &without_polarity(scene.clone())));
+        scene.vibration = presets::shaken();
+        failures.extend(wrong(&format!("{preset:?}, shaken"), &without_polarity(scene)));
+    }
+    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
+}
+
 /// Of small rotors that are looked at from aside, jitter blurs the edges by more than doubt of their harmonic leaves room for. Their
 /// events are read by nothing else either: two thirds of a speed was once told instead.
 #[test]

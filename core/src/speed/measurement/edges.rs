@@ -14,6 +14,9 @@ const FAINT: f32 = 1.5;
 /// without polarity.
 const MOST_BLUR: (f32, f32) = (0.1, 1.5);
 const LEAST_BLUR: (f32, f32) = (0.06, 1.3);
+/// Blur beyond which a single mark without polarity, whose axis moves little, shows no edges: its leading edge is matched with its trailing one,
+/// half of its width from either. What a table shakes is spread over the whole radius.
+const MOST_MARK_BLUR: (f32, f32) = (0.25, 1.5);
 /// Blur, noise and all, beyond which they are none where another harmonic keeps step.
 const MOST_RIVALLED_BLUR: (f32, f32) = (0.11, 1.65);
 /// The same in windings, of what could not be counted and is in doubt: of wheels of nine to sixteen parts in a hand, small ones, wrong
@@ -97,9 +100,11 @@ impl Measurement {
             self.blur_px(MOST_RIVALLED_BLUR, MOST_JITTER_S)
         };
         let sharp = !self.rivalled() || self.pose.sharpness_px() < most_px;
+        let both_edges = ignores_polarity && self.parts == Some(1) && !self.moves();
+        let most = if both_edges { MOST_MARK_BLUR } else { MOST_BLUR };
         self.too_fast_for_edges()
             || self.is_clear(ignores_polarity)
-            || self.edges_px() < self.blur_px(MOST_BLUR, MOST_JITTER_S) && sharp
+            || self.edges_px() < self.blur_px(most, MOST_JITTER_S) && sharp
     }
 
     /// Whether what keeps step may be how a table shakes a slow rotor: about a centre that is a little off, edges that go to and fro look as
