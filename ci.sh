@@ -89,7 +89,7 @@ evtach() {
   "${CARGO_TARGET_DIR:-target}/debug/evtach" "$@"
 }
 
-# A few minutes of the accuracy tables: both fail where a reading is more than 1 % off or told where no rotor is.
+# A few minutes of two of the tables: both fail where a reading is more than 1 % off or told where no rotor is.
 step_bench() {
   evtach bench blind --quick
   evtach bench trust --quick

@@ -7,8 +7,8 @@
 //! centre, the speed (by up to 3 %, so that no window holds whole turns by luck) and the first blade, and takes turns with
 //! direction and blade shape.
 //!
-//! Seeds below [`SCORED_FROM`] are for tuning: thresholds and gates may be chosen on them. Seeds from there on are scored
-//! and are never looked at to choose anything.
+//! Seeds below [`SCORED_FROM`] are for tuning: thresholds and gates may be chosen on them. Seeds from there on are scored,
+//! and are not looked at to choose anything: the README names those that were all the same.
 
 use evtach_host::synth::presets::{hand, shaken, wall};
 use evtach_host::synth::scene::{Gyro, Shape};
