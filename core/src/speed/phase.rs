@@ -35,8 +35,9 @@ fn phase(event: PolarEvent, rate: TurnRate, harmonic: u32) -> Turn {
     event.angle().minus(rate.after(event.t_us)).times(harmonic)
 }
 
-/// Sine and cosine of what an event is ahead of its ring's phase. Not inlined: flash is short.
-#[inline(never)]
+/// Sine and cosine of what an event is ahead of its ring's phase.
+// Inlined, as it is asked of every event.
+#[inline(always)]
 pub(super) fn ahead(
     event: PolarEvent,
     disc: Disc,
