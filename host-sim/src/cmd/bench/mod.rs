@@ -2,8 +2,8 @@
 //!
 //! Everything here is measured on synthetic recordings, whose truth is exact; [`spec`] says what they are. The
 //! tachometer is told nothing: no speed, no blade count, no centre. Whatever falls short of what is asked is named, and makes the exit
-//! code 1; of `--quick`, of few seeds of `accuracy` and few scenes of `trust` only wrong readings do. Times, of which one machine says
-//! little, are shown only, and so is the device's memory in `peers`.
+//! code 1; of `--quick` and of few scenes of `trust` only wrong readings do, and means of few seeds of `accuracy` may be twice as far
+//! off. Times, of which one machine says little, are shown only, and so is the device's memory in `peers`.
 
 mod accuracy;
 mod blind;
