@@ -99,6 +99,8 @@ pub struct Truth {
     pub centre_px: [f64; 2],
     /// Radius of the tips in pixels.
     pub radius_px: f64,
+    /// Tilt of the axis against the line of sight in degrees: the tips go round an ellipse.
+    pub tilt_deg: f64,
     /// Blades.
     pub blades: u8,
     /// Mean speed as the camera sees it in rpm, positive clockwise on the screen.
@@ -109,11 +111,41 @@ pub struct Truth {
     pub rpm_room: f64,
 }
 
+/// Farthest that a centre may be from its place, and a radius from its length, over the radius.
+const LARGEST_MISPLACEMENT: f64 = 0.15;
+
+impl Truth {
+    /// How far the rotor's centre was told from where it is in pixels.
+    #[must_use]
+    pub fn centre_off_px(&self, rotor: &RotorReading) -> f64 {
+        let [x_px, y_px] = self.centre_px;
+        (f64::from(rotor.x_px) - x_px).hypot(f64::from(rotor.y_px) - y_px)
+    }
+
+    /// What is wrong with the circle that was told for the rotor.
+    #[must_use]
+    pub fn misplaced(&self, rotor: &RotorReading) -> Option<String> {
+        let most_px = LARGEST_MISPLACEMENT * self.radius_px;
+        let radius_px = f64::from(rotor.radius_px);
+        let least_px = self.radius_px * self.tilt_deg.to_radians().cos();
+        let right = self.centre_off_px(rotor) <= most_px
+            && (least_px - most_px..=self.radius_px + most_px).contains(&radius_px);
+        let Self { centre_px: [x_px, y_px], radius_px: right_px, .. } = *self;
+        let RotorReading { x_px: x, y_px: y, .. } = rotor;
+        (!right).then(|| {
+            format!(
+                "at ({x:.0}, {y:.0}) r {radius_px:.0} px instead of ({x_px:.0}, {y_px:.0}) r {right_px:.0} px"
+            )
+        })
+    }
+}
+
 impl From<&RotorTruth> for Truth {
     fn from(rotor: &RotorTruth) -> Self {
         Self {
             centre_px: rotor.centre_px,
             radius_px: rotor.radius_px,
+            tilt_deg: rotor.tilt_deg,
             blades: rotor.blades,
             rpm_camera: rotor.rpm_camera_mean_signed,
             rpm_room: rotor.rpm_room_mean_signed,

@@ -100,8 +100,7 @@ impl Report {
         let error = rpm / right - 1.0;
         let sigma = f64::from(speed.rpm_sigma()) / rpm.abs();
         let near = error.abs() <= asked.largest_error.min(LARGEST_ERROR_SIGMA * sigma);
-        let [x_px, y_px] = truth.centre_px;
-        let centre_px = (f64::from(rotor.x_px) - x_px).hypot(f64::from(rotor.y_px) - y_px);
+        let centre_px = truth.centre_off_px(rotor);
         let blades = rotor.blades.map_or("?".to_owned(), |n| n.to_string());
         self.row([
             file,
@@ -120,6 +119,9 @@ impl Report {
         }
         if sigma > asked.largest_sigma {
             self.fail(file, capacity, &format!("{told}: sigma is {:.0} ppm", sigma * 1e6));
+        }
+        if let Some(misplaced) = truth.misplaced(rotor) {
+            self.fail(file, capacity, &format!("{told}: {misplaced}"));
         }
         if rotor.blades != Some(truth.blades) {
             self.fail(file, capacity, &format!("{blades} blades instead of {}", truth.blades));
@@ -264,7 +266,9 @@ fn spinning_dot(capacity: Capacity) {
     let (_, summary) = measure(&loaded, capacity);
     let truth = Truth {
         centre_px: [314.0, 202.0],
-        radius_px: 106.0,
+        // Of the disc that the dot sweeps; the ring of its middle has 106.
+        radius_px: 125.0,
+        tilt_deg: 0.0,
         blades: 1,
         rpm_camera: 1170.0,
         rpm_room: 1170.0,

@@ -41,6 +41,9 @@ fn wrong(name: &str, scene: &Scene) -> Vec<String> {
         if error.is_nan() || error.abs() > LARGEST_ERROR {
             wrong.push(format!("{name}: {expected:+.1} rpm read as {rpm:+.1}"));
         }
+        if let Some(misplaced) = truth.misplaced(rotor) {
+            wrong.push(format!("{name}: {expected:+.1} rpm {misplaced}"));
+        }
         if rotor.blades != Some(truth.blades) {
             wrong.push(format!("{name}: {} blades read as {:?}", truth.blades, rotor.blades));
         }
@@ -149,6 +152,20 @@ fn marks_without_polarity() {
         failures.extend(wrong(&format!("{preset:?}"), &without_polarity(scene.clone())));
         scene.vibration = presets::shaken();
         failures.extend(wrong(&format!("{preset:?}, shaken"), &without_polarity(scene)));
+    }
+    assert!(failures.is_empty(), "\n{}", failures.join("\n"));
+}
+
+/// Its line is found about an axis that is off, from which it reaches farther.
+#[test]
+fn a_dot_in_less_than_a_turn() {
+    let mut failures = Vec::new();
+    for seed in 1..=3 {
+        let mut scene = Scene { seed, duration_ms: 50.0, ..Preset::Dot.scene() };
+        (scene.width_px, scene.height_px) = (640, 480);
+        scene.rotors[0] = Rotor { x_px: 314.0, y_px: 202.0, radius_px: 125.0, ..scene.rotors[0] };
+        scene.rotors[0].rpm = 1150.0;
+        failures.extend(wrong("Dot", &scene));
     }
     assert!(failures.is_empty(), "\n{}", failures.join("\n"));
 }

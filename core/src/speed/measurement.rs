@@ -244,9 +244,14 @@ impl Measurement {
     }
 
     /// Share of the events that keep step with a speed in an angular harmonic, 0 to 1.
+    fn in_step(&self, polar: &[PolarEvent], omega_rad_s: f32, harmonic: u32) -> f32 {
+        self.coherence(polar, omega_rad_s, harmonic).0
+    }
+
+    /// The same, and the share of the disc's radius within which they lie.
     // Not inlined: flash is short.
     #[inline(never)]
-    fn in_step(&self, polar: &[PolarEvent], omega_rad_s: f32, harmonic: u32) -> f32 {
+    fn coherence(&self, polar: &[PolarEvent], omega_rad_s: f32, harmonic: u32) -> (f32, f32) {
         Pattern::learn(polar, self.disc, omega_rad_s, harmonic).coherence()
     }
 

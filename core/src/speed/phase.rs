@@ -19,6 +19,9 @@ use crate::rotors::Disc;
 const RINGS: usize = super::angular::BANKS / 2 + 1;
 const BANKS: usize = 2 * RINGS;
 
+/// Share that a ring, of either polarity, adds to the events in step within it, below which it lies beyond the rim.
+const LEAST_IN_RING: f32 = 0.01;
+
 /// Phases of the rotor's pattern by ring and polarity.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pattern {
@@ -66,19 +69,23 @@ impl Pattern {
         pattern
     }
 
-    /// Share of events in step, 0 to 1, corrected for what chance gives.
+    /// Share of events in step, 0 to 1, corrected for what chance gives; and the share of the disc's radius within which they lie, by the
+    /// outermost ring that adds a hundredth to them.
     #[must_use]
     // Not inlined: flash is short.
     #[inline(never)]
-    pub fn coherence(&self) -> f32 {
-        let mut in_step = 0.0;
-        let mut total = 0.0;
-        for (sum, count) in self.sums.iter().zip(self.counts) {
+    pub fn coherence(&self) -> (f32, f32) {
+        let (mut in_step, mut total, mut rings) = (0.0, 0.0, 0);
+        for (bank, (sum, count)) in self.sums.iter().zip(self.counts).enumerate() {
             let excess = sum.0 * sum.0 + sum.1 * sum.1 - count as f32;
-            in_step += sqrt(excess.max(0.0));
+            let more = sqrt(excess.max(0.0));
+            in_step += more;
             total += count as f32;
+            if more > LEAST_IN_RING * in_step {
+                rings = bank / 2 + 1;
+            }
         }
-        in_step / total.max(1.0)
+        (in_step / total.max(1.0), rings as f32 / RINGS as f32)
     }
 
     /// Adds its sums to those of others.
@@ -305,9 +312,22 @@ pub(super) mod tests {
             assert_eq!(found.best, windings, "{found:?}");
             let omega_rad_s = line_hz * TAU / windings as f32;
             let phases = Pattern::learn(&track, DISC, omega_rad_s, windings.unsigned_abs());
-            let share = phases.coherence();
+            let (share, _) = phases.coherence();
             assert!(share > 0.5 && (found.share - share).abs() < 0.01, "{share} {found:?}");
             assert!(found.rival_share < 0.15, "{found:?}");
         }
+    }
+
+    #[test]
+    fn a_disc_reaches_as_far_as_what_keeps_step() {
+        let track = pattern(3, 120.0);
+        let reach = |radius_px| {
+            let disc = Disc { radius_px, ..DISC };
+            Pattern::learn(&track, disc, 120.0 * TAU / 3.0, 3).coherence().1
+        };
+        assert_eq!(reach(DISC.radius_px), 1.0);
+        assert_eq!(reach(2.0 * DISC.radius_px), 0.5);
+        // By the ring that the rim is in: never less than what turns.
+        assert_eq!(reach(1.5 * DISC.radius_px), 0.75);
     }
 }

@@ -69,10 +69,16 @@ impl Measurement {
             self.stage = Stage::Track;
             return;
         }
-        let coherence = self.in_step(polar, self.omega_rad_s, self.harmonic);
+        let (coherence, reach) = self.coherence(polar, self.omega_rad_s, self.harmonic);
         self.evidence.coherence = Some(coherence);
         if coherence < self.least_coherence() {
             return self.refuse(Reason::NoRotation);
+        }
+        // Found about an axis that was far off, it reached farther from there. Never 0: where nothing keeps step, it is refused above.
+        if reach < 1.0 {
+            self.disc.radius_px *= reach;
+            self.stage = Stage::Track;
+            return;
         }
         self.faint = self.is_faint(coherence);
         self.turn = 0;
