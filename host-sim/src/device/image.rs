@@ -11,12 +11,16 @@ use object::{
 
 use super::DeviceError;
 
+/// Cargo's home that sizes are told for: the image names the path of each source file that may panic, and what fits on one machine
+/// would not on another.
+const HOME: &str = "/root/.cargo";
+
 /// What the linker made.
 #[derive(Clone, Debug)]
 pub struct Image {
     /// Where it lies.
     pub path: PathBuf,
-    /// Bytes in flash: code, constants, and the values that variables start with.
+    /// Bytes in flash: code, constants, and the values that variables start with. With cargo's home at `/root/.cargo`, wherever it is.
     pub flash_bytes: u64,
     /// Bytes of variables in RAM, without the stack.
     pub ram_bytes: u64,
@@ -102,6 +106,9 @@ impl Image {
         let stack_bytes = address("_stack_start").saturating_sub(address("_stack_end"));
         let flash =
             flash(&bytes).map_err(|source| DeviceError::Image { path: path.clone(), source })?;
+        if let Some(home) = cargo_home() {
+            flash_bytes = flash_bytes.saturating_add_signed(-longer_by(&flash, &home));
+        }
         Ok(Self { path, flash_bytes, ram_bytes, stack_bytes, symbols, flash })
     }
 
@@ -131,6 +138,18 @@ impl Image {
             })
             .collect()
     }
+}
+
+fn cargo_home() -> Option<PathBuf> {
+    env::var_os("CARGO_HOME").map(PathBuf::from).or_else(|| Some(env::home_dir()?.join(".cargo")))
+}
+
+/// By how many bytes what flash holds is longer than with cargo's home at [`HOME`].
+fn longer_by(flash: &[u8], home: &Path) -> i64 {
+    let sources = home.join("registry").join("src");
+    let sources = sources.as_os_str().as_encoded_bytes();
+    let times = flash.windows(sources.len()).filter(|bytes| *bytes == sources).count();
+    times as i64 * (home.as_os_str().len() as i64 - HOME.len() as i64)
 }
 
 /// What the image puts into flash, from the lowest address on: what `objcopy -O binary` writes.
@@ -187,5 +206,13 @@ mod tests {
             symbols: symbols.map(str::to_owned).to_vec(),
         };
         assert_eq!(image.unwanted_symbols(), symbols[..5]);
+    }
+
+    #[test]
+    fn the_path_of_cargos_home_is_told_for_one_of_twelve_letters() {
+        let flash = b"\xff/home/ada/.cargo/registry/src/a.rs/home/ada/.cargo/registry/src/b.rs/home/ada/c.rs";
+        assert_eq!(longer_by(flash, Path::new("/home/ada/.cargo")), 2 * 4);
+        assert_eq!(longer_by(flash, Path::new("/home/a")), 0);
+        assert_eq!(longer_by(b"/c/registry/src/a.rs", Path::new("/c")), -10);
     }
 }
