@@ -3,6 +3,7 @@
 mod json;
 mod letters;
 mod mean;
+mod pause;
 mod run;
 mod since;
 mod summary;

@@ -5,6 +5,7 @@ use std::ops::Range;
 use evtach_core::{Event, GyroSample, Reading, Settings};
 
 use super::letters::Letters;
+use super::pause::Pauses;
 use super::wait::Wait;
 use super::{Capacity, FileFacts, Ties, Timeline, drain, feed, with_tachometer};
 use crate::recording::{ImuSample, Recording, RecordingError};
@@ -72,6 +73,7 @@ impl Run {
             let mut letters = Letters::default();
             let (mut rolls, mut wait) = (Vec::<GyroSample>::new(), Wait::default());
             let mut rolled_us = 0;
+            let mut pauses = Pauses::within(plan.settings.roi);
             while !parts.is_done() {
                 let set_back_us = parts.next(&mut part);
                 chosen.leave(&mut part, &parts.timeline);
@@ -91,17 +93,25 @@ impl Run {
                 // A recorder that writes samples before the events of their time has told some of the next part.
                 let of_part = Timeline::samples_of_part(rolled_us, &rolls);
                 let mut ahead = &rolls[..of_part];
+                // The device forgets a window that is not full when its clock leaves it behind. What is out of order throughout will be
+                // refused.
+                let keeps_last = plan.capacity == Capacity::Full && !parts.recording.is_shuffled();
                 let mut keep = |reading| {
                     readings.push(letters.lettered(parts.timeline.laid(reading)));
                 };
-                feed(tachometer, &part, &mut ahead, &mut keep);
+                let mut rest = &part[..];
+                while !rest.is_empty() {
+                    let (stretch, later) = rest.split_at(pauses.before(rest));
+                    feed(tachometer, stretch, &mut ahead, &mut keep);
+                    if keeps_last && !later.is_empty() {
+                        tachometer.finish();
+                        drain(tachometer, &mut keep);
+                    }
+                    rest = later;
+                }
                 let used = of_part - ahead.len();
                 rolled_us = rolls.drain(..used).next_back().map_or(rolled_us, |sample| sample.t_us);
-                // The device forgets a window that its clock leaves behind. What is out of order throughout will be refused.
-                let ends = set_back_us.is_some()
-                    && plan.capacity == Capacity::Full
-                    && !parts.recording.is_shuffled();
-                if ends || parts.is_done() {
+                if keeps_last && set_back_us.is_some() || parts.is_done() {
                     tachometer.finish();
                     drain(tachometer, &mut keep);
                 }
@@ -110,6 +120,7 @@ impl Run {
                         tachometer.configure(plan.settings);
                     }
                     (wait, rolled_us) = (Wait::default(), 0);
+                    pauses = Pauses::within(plan.settings.roi);
                 }
             }
             chosen.facts.thinned = tachometer.thinned();

@@ -6,6 +6,7 @@ mod contract;
 mod convert;
 mod demo;
 mod gyro;
+mod parts;
 mod screen;
 
 use std::path::{Path, PathBuf};
