@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, bail};
 use evtach_core::limits::MOST_STATED_BLADES;
 use evtach_core::{Event, Geometry, Reading, Roi, Settings};
-use evtach_host::measure::{Capacity, FileFacts, Plan, Run, Summary, Timeline, summarise};
+use evtach_host::measure::{Capacity, FileFacts, Plan, Run, Summary, Timeline, summarise_all};
 use evtach_host::recording;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -119,7 +119,7 @@ impl How {
         }
         in_order(&recording, &name)?;
         let Run { facts, readings, .. } = run;
-        let summary = summarise(&readings, &(facts.first_us..facts.last_us), self.clock_ppm);
+        let summary = summarise_all(&readings, &facts.streams_us, self.clock_ppm);
         let (geometry, assumed) = (recording.geometry, recording.assumed);
         Ok(Measured { plan, facts, geometry, assumed, readings, summary })
     }

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::fmt;
+use std::ops::Range;
 
 use evtach_core::{Reading, RotorReading, Status};
 use serde::{Deserialize, Serialize};
@@ -127,6 +128,8 @@ pub struct FileFacts {
     pub first_us: u64,
     /// Last event that was measured in sensor time.
     pub last_us: u64,
+    /// From the first to the last of these in each recording: there are several, where they are put behind each other.
+    pub streams_us: Vec<Range<u64>>,
     /// Events that were measured.
     pub events: u64,
     /// Events left out on purpose.

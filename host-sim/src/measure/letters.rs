@@ -16,6 +16,8 @@ pub struct Letters {
     seen: Vec<Seen>,
     /// Letters under which a speed was told.
     spoken: [bool; 256],
+    /// Letters that any rotor had.
+    given: [bool; 256],
     readings: u64,
 }
 
@@ -41,11 +43,17 @@ impl Seen {
 
 impl Default for Letters {
     fn default() -> Self {
-        Self { seen: Vec::new(), spoken: [false; 256], readings: 0 }
+        Self { seen: Vec::new(), spoken: [false; 256], given: [false; 256], readings: 0 }
     }
 }
 
 impl Letters {
+    /// Says that what comes next is another recording: no rotor of it is one of those so far, nor has a letter of theirs.
+    pub fn start_anew(&mut self) {
+        self.seen.clear();
+        self.spoken = self.given;
+    }
+
     /// Puts the letters of the series in place of the tracker's.
     #[must_use]
     pub fn lettered(&mut self, mut reading: Reading) -> Reading {
@@ -61,6 +69,7 @@ impl Letters {
             let radius_px = rotor.radius_px;
             self.seen.push(Seen { tracked, letter, place_px, radius_px, reading: now });
             self.spoken[usize::from(letter)] |= rotor.speed.is_some();
+            self.given[usize::from(letter)] = true;
             rotor.id = letter;
         }
         reading.rotors.sort_unstable_by_key(|rotor| rotor.id);
@@ -143,6 +152,15 @@ mod tests {
         assert_eq!(after(&mut letters, 1, &[rotor(0, 90.0, true)]), [0]);
         assert!(after(&mut letters, 2, &[]).is_empty());
         assert_eq!(after(&mut letters, 1, &[rotor(0, 150.0, true)]), [1]);
+    }
+
+    #[test]
+    fn rotors_of_another_recording_are_others() {
+        let mut letters = Letters::default();
+        let (a, silent) = (rotor(0, 50.0, true), rotor(1, 200.0, false));
+        assert_eq!(after(&mut letters, 3, &[a.clone(), silent.clone()]), [0, 1]);
+        letters.start_anew();
+        assert_eq!(after(&mut letters, 3, &[a, silent]), [2, 3]);
     }
 
     #[test]

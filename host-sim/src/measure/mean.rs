@@ -19,6 +19,12 @@ const SLOPE_PER_SPEED: f64 = 7.746;
 /// What a hand rolls a camera to and fro by, in rad/s: it is in the swing that a window shows, and not in a speed relative to the room.
 const HAND_ROLL_RAD_S: f64 = 0.2;
 
+/// When a reading's window lies.
+pub fn window_us(reading: &Reading) -> Range<u64> {
+    let start_us = reading.t_us.saturating_sub(u64::from(reading.window_us) / 2);
+    start_us..start_us + u64::from(reading.window_us)
+}
+
 /// The mean speed within one reading's window.
 pub struct Piece {
     window_us: Range<u64>,
@@ -29,9 +35,11 @@ pub struct Piece {
 impl Piece {
     /// A rotor's speed in a reading, and how it swings within the window.
     pub fn new(reading: &Reading, speed: Speed, swing_rad_s: Option<f32>) -> Self {
-        let start_us = reading.t_us.saturating_sub(u64::from(reading.window_us) / 2);
-        let window_us = start_us..start_us + u64::from(reading.window_us);
-        Self { window_us, speed, swing_rad_s: f64::from(swing_rad_s.unwrap_or(0.0)) }
+        Self {
+            window_us: window_us(reading),
+            speed,
+            swing_rad_s: f64::from(swing_rad_s.unwrap_or(0.0)),
+        }
     }
 
     fn length_us(&self) -> u64 {

@@ -25,7 +25,7 @@ use ties::Ties;
 pub use json::{Document, FileFacts, PROGRAM, ReadingRow, RotorRow, SettingsRow, letter};
 pub use run::{Plan, Run};
 pub use since::Since;
-pub use summary::{Summary, summarise};
+pub use summary::{Summary, summarise, summarise_all};
 pub use table::{evidence, table};
 pub use timeline::Timeline;
 pub use wait::LONGEST_US as LONGEST_WAIT_US;

@@ -66,6 +66,7 @@ impl Run {
                 since_us,
                 origin_us: None,
                 is_inside: plan.since_us.start == 0,
+                starts_anew: true,
                 facts: &mut facts,
                 seen,
             };
@@ -116,6 +117,10 @@ impl Run {
                     drain(tachometer, &mut keep);
                 }
                 if let Some(t_us) = set_back_us {
+                    if parts.timeline.starts_anew() {
+                        letters.start_anew();
+                        chosen.starts_anew = true;
+                    }
                     if parts.timeline.set_back_to(t_us) {
                         tachometer.configure(plan.settings);
                     }
@@ -139,6 +144,8 @@ struct Chosen<'a, S> {
     origin_us: Option<u64>,
     /// Whether the last event so far was of the part: what is lost then is lost of it.
     is_inside: bool,
+    /// Whether no event of the recording at hand was of the part.
+    starts_anew: bool,
     facts: &'a mut FileFacts,
     seen: S,
 }
@@ -158,6 +165,13 @@ impl<S: FnMut(&[Event], &Timeline)> Chosen<'_, S> {
             self.facts.first_us = timeline.at(first.t_us);
         }
         self.facts.last_us = timeline.at(last.t_us);
+        if std::mem::take(&mut self.starts_anew) {
+            let first_us = timeline.at(first.t_us);
+            self.facts.streams_us.push(first_us..first_us);
+        }
+        if let Some(stream_us) = self.facts.streams_us.last_mut() {
+            stream_us.end = self.facts.last_us;
+        }
         self.facts.events += events.len() as u64;
         (self.seen)(events, timeline);
     }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use evtach_core::{Reading, Reason, RotorReading, Status};
 
-use super::mean::{Piece, mean_speed};
+use super::mean::{Piece, mean_speed, window_us};
 
 /// A rotor must be measured in this share of the readings that the most seen one is measured in, else it
 /// stands in the series only.
@@ -29,6 +29,26 @@ impl Summary {
     }
 }
 
+/// Sums up the series of recordings put behind each other, none of which shares a letter with another; `streams_us` are the span of each.
+#[must_use]
+pub fn summarise_all(
+    readings: &[Reading],
+    streams_us: &[Range<u64>],
+    clock_sigma_ppm: f32,
+) -> Summary {
+    let (mut rest, mut rotors) = (readings, Vec::new());
+    for (index, span_us) in streams_us.iter().enumerate() {
+        let is_later = |reading: &Reading| {
+            streams_us.get(index + 1).is_some_and(|next_us| reading.t_us >= next_us.start)
+        };
+        let of_it = rest.iter().position(is_later).unwrap_or(rest.len());
+        rotors.extend(summarise(&rest[..of_it], span_us, clock_sigma_ppm).rotors);
+        rest = &rest[of_it..];
+    }
+    rotors.sort_by_key(|rotor| rotor.id);
+    Summary { status: best_status(&rotors, readings), rotors }
+}
+
 /// Sums up a series; `span_us` is from the first event of the recording to the last, in sensor time.
 #[must_use]
 pub fn summarise(readings: &[Reading], span_us: &Range<u64>, clock_sigma_ppm: f32) -> Summary {
@@ -51,15 +71,19 @@ pub fn summarise(readings: &[Reading], span_us: &Range<u64>, clock_sigma_ppm: f3
         })
         .filter_map(|id| over_recording(readings, *id, span_us, clock_sigma_ppm))
         .collect();
+    Summary { status: best_status(&rotors, readings), rotors }
+}
+
+/// The best status among the rotors, or why there is none.
+fn best_status(rotors: &[RotorReading], readings: &[Reading]) -> Status {
     let has = |status: Status| rotors.iter().any(|rotor| rotor.status == status);
-    let status = if has(Status::Locked) {
+    if has(Status::Locked) {
         Status::Locked
     } else if has(Status::Coarse) {
         Status::Coarse
     } else {
         refusal(readings)
-    };
-    Summary { status, rotors }
+    }
 }
 
 fn rows(readings: &[Reading], id: u8) -> impl Iterator<Item = (&Reading, &RotorReading)> {
@@ -84,8 +108,7 @@ fn over_recording(
     span_us: &Range<u64>,
     clock_sigma_ppm: f32,
 ) -> Option<RotorReading> {
-    let locked: Vec<_> =
-        rows(readings, id).filter(|(_, rotor)| rotor.status == Status::Locked).collect();
+    let OneWay { rows: locked, span_us } = OneWay::of(readings, id, span_us);
     if let Some((_, last)) = locked.last() {
         let mut rotor = (*last).clone();
         let pieces: Vec<Piece> = locked
@@ -94,7 +117,7 @@ fn over_recording(
                 Some(Piece::new(reading, rotor.speed?, rotor.evidence.swing_rad_s))
             })
             .collect();
-        rotor.speed = mean_speed(&pieces, span_us, clock_sigma_ppm);
+        rotor.speed = mean_speed(&pieces, &span_us, clock_sigma_ppm);
         let middle_us = span_us.start.midpoint(span_us.end);
         let middle = locked.iter().min_by_key(|(reading, _)| reading.t_us.abs_diff(middle_us));
         if let Some((_, middle)) = middle {
@@ -108,4 +131,114 @@ fn over_recording(
         .min_by(|a, b| sigma(a.1).total_cmp(&sigma(b.1)))
         .or_else(|| rows(readings, id).last())
         .map(|(_, rotor)| rotor.clone())
+}
+
+/// The locked readings of a rotor, in all of which it turns in one direction: where it turned round, those of the longest stretch, for
+/// the mean over both directions would be the speed of neither.
+pub(super) struct OneWay<'a> {
+    pub rows: Vec<(&'a Reading, &'a RotorReading)>,
+    /// From when to when it did not turn in the other one, as far as is known.
+    pub span_us: Range<u64>,
+}
+
+impl<'a> OneWay<'a> {
+    /// Of the readings of a recording that lasts `span_us`.
+    pub fn of(readings: &'a [Reading], id: u8, span_us: &Range<u64>) -> Self {
+        let locked: Vec<_> =
+            rows(readings, id).filter(|(_, rotor)| rotor.status == Status::Locked).collect();
+        let way = |rotor: &RotorReading| rotor.speed.map(|speed| speed.direction());
+        let lasts_us = |stretch: &&[(&Reading, _)]| {
+            let ends = stretch.first().zip(stretch.last());
+            ends.map(|(first, last)| window_us(last.0).end - window_us(first.0).start)
+        };
+        let stretches = locked.chunk_by(|a, b| way(a.1) == way(b.1));
+        let longest = stretches.max_by_key(lasts_us).unwrap_or_default();
+        let mut span_us = span_us.clone();
+        if let (Some((first, _)), Some((last, _))) = (longest.first(), longest.last()) {
+            if locked.first().is_some_and(|(reading, _)| reading.t_us < first.t_us) {
+                span_us.start = window_us(first).start;
+            }
+            if locked.last().is_some_and(|(reading, _)| reading.t_us > last.t_us) {
+                span_us.end = window_us(last).end;
+            }
+        }
+        Self { rows: longest.to_vec(), span_us }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use evtach_core::{Evidence, Frame, Speed};
+
+    use super::*;
+
+    /// A reading every 50 ms, over 150 ms each, with a rotor of these speeds.
+    fn readings(rpm: &[f32]) -> Vec<Reading> {
+        let at = |(i, rpm): (u64, &f32)| {
+            let speed = Speed {
+                omega_rad_s: rpm / Speed::RPM_PER_RAD_S,
+                omega_sigma_rad_s: 0.01,
+                alpha_rad_s2: None,
+                frame: Frame::Camera,
+            };
+            let rotor = RotorReading {
+                id: 0,
+                x_px: i as f32,
+                y_px: 50.0,
+                radius_px: 40.0,
+                blades: None,
+                status: Status::Locked,
+                speed: Some(speed),
+                evidence: Evidence::default(),
+            };
+            Reading {
+                t_us: 75_000 + 50_000 * i,
+                window_us: 150_000,
+                events: 1000,
+                thinned: 0,
+                lost: 0,
+                status: Status::Locked,
+                rotors: [rotor].into_iter().collect(),
+            }
+        };
+        (0..).zip(rpm).map(at).collect()
+    }
+
+    #[test]
+    fn a_rotor_that_turns_round_is_told_by_its_longest_stretch_in_one_direction() {
+        // To and fro: each mean is of one direction, and of none of the time in which it turned in the other one.
+        for (rpm, expected_rpm, span_ms) in [
+            (vec![1500.0, 1500.0, 1500.0, -1200.0], 1500.0, 0..250),
+            (vec![1500.0, -1200.0, -1200.0], -1200.0, 50..300),
+            (vec![900.0, -1200.0, -1200.0, 900.0], -1200.0, 50..250),
+            (vec![1500.0, 1500.0, 1500.0], 1500.0, 0..300),
+        ] {
+            let (readings, whole_us) = (readings(&rpm), 0..300_000);
+            let OneWay { span_us, .. } = OneWay::of(&readings, 0, &whole_us);
+            assert_eq!(span_us, 1000 * span_ms.start..1000 * span_ms.end, "{rpm:?}");
+            let summary = summarise(&readings, &whole_us, 0.0);
+            let speed = summary.rotors[0].speed.expect("it was locked");
+            let told_rpm = speed.omega_rad_s * Speed::RPM_PER_RAD_S;
+            assert!((told_rpm - expected_rpm).abs() < 0.1, "{rpm:?}: {told_rpm}");
+            assert_eq!(speed.alpha_rad_s2, None, "{rpm:?}");
+        }
+    }
+
+    #[test]
+    fn a_recording_put_behind_another_has_a_summary_of_its_own() {
+        // One that is seen long, and another, seen in one reading, of which nothing is filled in from the first.
+        let mut readings = readings(&[1500.0; 13]);
+        readings[12].t_us += 200_000;
+        readings[12].rotors[0].id = 1;
+        let streams_us = [0..725_000, 725_000..950_000];
+        let summary = summarise_all(&readings, &streams_us, 0.0);
+        assert_eq!(summary.status, Status::Locked);
+        let ids: Vec<u8> = summary.rotors.iter().map(|rotor| rotor.id).collect();
+        assert_eq!(ids, [0, 1]);
+        for (rotor, (rows, span_us)) in
+            summary.rotors.iter().zip([(0..12, &streams_us[0]), (12..13, &streams_us[1])])
+        {
+            assert_eq!(*rotor, summarise(&readings[rows], span_us, 0.0).rotors[0]);
+        }
+    }
 }

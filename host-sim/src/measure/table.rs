@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use evtach_core::{Frame, Reading, RotorReading, Speed, Status};
 
 use super::json::{FileFacts, letter};
-use super::summary::Summary;
+use super::summary::{OneWay, Summary};
 
 /// Formats the result of one recording.
 #[must_use]
@@ -43,17 +43,24 @@ pub fn table(facts: &FileFacts, summary: &Summary, readings: &[Reading]) -> Stri
     text
 }
 
-/// From when to when a rotor was as well measured as it is told, where that leaves more of the recording open than a window.
+/// From when to when a rotor was as well measured as it is told, where that leaves more of the recording open than a window, where it
+/// turned round meanwhile, or where there are several recordings.
 fn stretch(facts: &FileFacts, readings: &[Reading], told: &RotorReading) -> String {
     let is_it = |rotor: &RotorReading| (rotor.id, rotor.status) == (told.id, told.status);
-    let mut of_it = readings.iter().filter(|reading| reading.rotors.iter().any(is_it));
-    let Some(first) = of_it.next() else { return String::new() };
-    let last = of_it.next_back().unwrap_or(first);
+    let mut of_it: Vec<&Reading> =
+        readings.iter().filter(|reading| reading.rotors.iter().any(is_it)).collect();
+    let all = of_it.len();
+    if told.status == Status::Locked {
+        let one_way = OneWay::of(readings, told.id, &(facts.first_us..facts.last_us));
+        of_it = one_way.rows.into_iter().map(|(reading, _)| reading).collect();
+    }
+    let (Some(first), Some(last)) = (of_it.first(), of_it.last()) else { return String::new() };
     let half_us = |reading: &Reading| u64::from(reading.window_us) / 2;
     let start_us = first.t_us.saturating_sub(half_us(first));
     let end_us = last.t_us.saturating_add(half_us(last));
     let open_us = start_us.saturating_sub(facts.first_us).max(facts.last_us.saturating_sub(end_us));
-    if open_us <= u64::from(first.window_us.max(last.window_us)) {
+    let is_whole = of_it.len() == all && facts.streams_us.len() <= 1;
+    if is_whole && open_us <= u64::from(first.window_us.max(last.window_us)) {
         return String::new();
     }
     format!("  from {:.2} to {:.2} s", facts.t_s(start_us), facts.t_s(end_us))

@@ -44,6 +44,12 @@ impl Timeline {
         self.starts_anew = true;
     }
 
+    /// Whether what comes next is another recording.
+    #[must_use]
+    pub const fn starts_anew(&self) -> bool {
+        self.starts_anew
+    }
+
     /// Begins the next part: the clock was set back to the time of its first event. Tells whether by so little that the tachometer,
     /// which is told of it by the times alone, would take it for disorder.
     pub fn set_back_to(&mut self, t_us: u64) -> bool {
