@@ -94,11 +94,9 @@ fn rows(readings: &[Reading], id: u8) -> impl Iterator<Item = (&Reading, &RotorR
 
 /// The reason of the longest window that was refused: it had the most to go by.
 fn refusal(readings: &[Reading]) -> Status {
-    let longest = readings.iter().max_by_key(|reading| reading.window_us);
-    longest.map_or(Status::Refused(Reason::NoEvents), |reading| match reading.status {
-        Status::Refused(_) => reading.status,
-        Status::Locked | Status::Coarse => Status::Refused(Reason::Ambiguous),
-    })
+    let refused = readings.iter().filter(|reading| reading.status.reason().is_some());
+    let longest = refused.max_by_key(|reading| reading.window_us);
+    longest.map_or(Status::Refused(Reason::NoEvents), |reading| reading.status)
 }
 
 /// One rotor over the recording: from its locked readings, else its sharpest coarse one, else its last refusal.
