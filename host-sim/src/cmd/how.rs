@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use evtach_core::limits::MOST_STATED_BLADES;
-use evtach_core::{Event, Geometry, Reading, Roi, Settings};
+use evtach_core::{Event, Geometry, Ignored, Reading, Roi, Settings};
 use evtach_host::measure::{Capacity, FileFacts, Plan, Run, Summary, Timeline, summarise_all};
 use evtach_host::recording;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -107,10 +107,13 @@ impl How {
         if run.readings.is_empty() && (!self.span.is_all() || self.roi.is_some()) {
             bail!("{name}: no events between --start and --end inside --roi; widen them");
         }
-        if run.out_of_order > 0 {
+        let Ignored { out_of_order, out_of_roi, overrun, .. } = run.ignored;
+        if out_of_order > 0 {
+            tell(format!("{name}: {out_of_order} events stepped back in time and were left out"));
+        }
+        if overrun > 0 {
             tell(format!(
-                "{name}: {} events stepped back in time and were left out",
-                run.out_of_order
+                "{name}: {overrun} events are in no window: they came right before a break in the stream or a window that began anew"
             ));
         }
         if run.timeline.is_set_back() {
@@ -120,6 +123,10 @@ impl How {
         in_order(&recording, &name)?;
         let Run { facts, readings, .. } = run;
         let summary = summarise_all(&readings, &facts.streams_us, self.clock_ppm);
+        if out_of_roi > 0 && !summary.has_speed() {
+            // It may be why.
+            tell(format!("{name}: {out_of_roi} of {} events lie outside --roi", facts.events));
+        }
         let (geometry, assumed) = (recording.geometry, recording.assumed);
         Ok(Measured { plan, facts, geometry, assumed, readings, summary })
     }

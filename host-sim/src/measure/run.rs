@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use evtach_core::{Event, GyroSample, Reading, Settings};
+use evtach_core::{Event, GyroSample, Ignored, Reading, Settings};
 
 use super::letters::Letters;
 use super::pause::Pauses;
@@ -32,8 +32,8 @@ pub struct Run {
     pub readings: Vec<Reading>,
     /// Events of the whole file.
     pub events_read: u64,
-    /// Events that stepped back in time and were left out; `facts.lost` counts them, too.
-    pub out_of_order: u64,
+    /// Events that the tachometer did not use, by cause; `facts.lost` counts those out of order, too.
+    pub ignored: Ignored,
     /// Whether there were gyro samples that were to be taken.
     pub has_gyro: bool,
     /// Where the clock was set back.
@@ -60,7 +60,7 @@ impl Run {
         let mut readings = Vec::new();
         let mut has_gyro = false;
         let mut parts = Parts::of(recording, plan.capacity);
-        let out_of_order = with_tachometer(plan.settings, plan.capacity, |tachometer| {
+        let ignored = with_tachometer(plan.settings, plan.capacity, |tachometer| {
             let since_us = plan.since_us.clone();
             let mut chosen = Chosen {
                 since_us,
@@ -129,11 +129,11 @@ impl Run {
                 }
             }
             chosen.facts.thinned = tachometer.thinned();
-            tachometer.ignored().out_of_order
+            tachometer.ignored()
         });
         let Parts { timeline, events_read, damage, .. } = parts;
-        facts.lost += out_of_order;
-        Self { facts, readings, events_read, out_of_order, has_gyro, timeline, damage }
+        facts.lost += ignored.out_of_order;
+        Self { facts, readings, events_read, ignored, has_gyro, timeline, damage }
     }
 }
 

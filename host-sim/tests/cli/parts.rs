@@ -5,6 +5,14 @@ use evtach_host::synth::{Rotor, Scene, generate};
 
 use super::{SIDES_PX, evtach, folder, measure, rotor, write};
 
+/// A rotor at a speed, so many milliseconds long.
+fn turning(rpm: f64, duration_ms: f64) -> Vec<Event> {
+    let rotor = Rotor { x_px: 100.0, y_px: 80.0, rpm, ..Rotor::default() };
+    let (width_px, height_px) = SIDES_PX;
+    let scene = Scene { width_px, height_px, duration_ms, rotors: vec![rotor], ..Scene::default() };
+    generate(&scene).expect("a scene in range").events
+}
+
 /// The rows of rotors in a table.
 fn rows(stdout: &str) -> Vec<&str> {
     stdout.lines().filter(|line| line.contains(" rpm ")).collect()
@@ -42,12 +50,7 @@ fn a_pause_leaves_what_came_before_it() {
 #[test]
 fn recordings_behind_each_other_have_rotors_of_their_own() {
     let folder = folder();
-    let one = |name, rpm| {
-        let rotor = Rotor { x_px: 100.0, y_px: 80.0, rpm, ..Rotor::default() };
-        let (width_px, height_px) = SIDES_PX;
-        let scene = Scene { width_px, height_px, rotors: vec![rotor], ..Scene::default() };
-        write(&folder, name, &generate(&scene).expect("a scene in range").events)
-    };
+    let one = |name, rpm| write(&folder, name, &turning(rpm, 150.0));
     let bytes = |path| std::fs::read(path).expect("the file just written");
     let first = bytes(one("first.raw", 1500.0));
     for (rpm, way) in [(-1500.0, "ccw"), (3000.0, "cw")] {
@@ -70,5 +73,32 @@ fn recordings_behind_each_other_have_rotors_of_their_own() {
             rows.iter().all(|row| row.contains(" from ") && !row.contains("rpm/s")),
             "{rows:?}"
         );
+    }
+}
+
+/// What no reading is of is told, and so is a region that holds little.
+#[test]
+fn events_in_no_window_are_told() {
+    let folder = folder();
+    // The rotor is locked before the pause, and what is left of it is no window.
+    let first = turning(2400.0, 200.0);
+    let later: Vec<Event> =
+        first.iter().map(|event| Event { t_us: event.t_us + 5_000_000, ..*event }).collect();
+    let path = write(&folder, "twice.raw", &[first, later].concat()).display().to_string();
+    for capacity in ["full", "device"] {
+        let run = evtach(&["measure", "--capacity", capacity, &path], b"");
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        assert!(run.stderr.contains(" events are in no window: "), "{capacity}: {}", run.stderr);
+    }
+    let path = write(&folder, "rotor.raw", &rotor()).display().to_string();
+    let run = evtach(&["measure", &path], b"");
+    assert!(!run.stderr.contains("in no window"), "{}", run.stderr);
+    let inside = rotor().iter().filter(|event| event.x < 4).count();
+    let told = format!("{} of {} events lie outside --roi", rotor().len() - inside, rotor().len());
+    for (roi, code, is_told) in [("0,0,4,160", 1, true), ("0,0,199,160", 0, false)] {
+        let run = evtach(&["measure", "--roi", roi, &path], b"");
+        assert_eq!(run.code, Some(code), "{}", run.stderr);
+        assert_eq!(run.stderr.contains(&told), is_told, "{told}: {}", run.stderr);
+        assert_eq!(run.stderr.contains("--roi"), is_told, "{}", run.stderr);
     }
 }
