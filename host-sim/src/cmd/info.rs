@@ -146,6 +146,7 @@ fn report(
         ("lost", recording.lost()),
         ("clock wraps", recording.side().wraps),
         ("before the time", recording.side().untimed),
+        ("unknown words", recording.side().unknown),
     ] {
         writeln!(out, "{label:<15} {count}")?;
     }

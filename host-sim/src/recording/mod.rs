@@ -81,6 +81,8 @@ pub struct Side {
     pub wraps: u64,
     /// Events dropped because the stream had not told the time yet.
     pub untimed: u64,
+    /// Words of a type that the format does not define.
+    pub unknown: u64,
     /// Inertial samples since they were last taken.
     pub imu: Vec<ImuSample>,
     /// What a person should know, one sentence each: cut files, skipped streams.
@@ -94,6 +96,7 @@ impl Side {
     fn note(&mut self, counts: Counts) {
         self.wraps = counts.wraps.into();
         self.untimed = counts.untimed;
+        self.unknown = counts.unknown;
     }
 }
 

@@ -203,6 +203,24 @@ fn info_tells_what_a_recording_holds() {
     }
 }
 
+#[test]
+fn words_of_unknown_type_are_told() {
+    let folder = TempDir::new().expect("a temporary folder");
+    let path = file(&folder, "in.evt3.raw", WriteFormat::Evt3, &rotor());
+    for count in [0, 3] {
+        let run = evtach(&["info", &path], b"");
+        assert!(run.stdout.contains(&format!("unknown words   {count}\n")), "{}", run.stdout);
+        let run = evtach(&["measure", &path], b"");
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        let told = format!("{count} words of unknown type");
+        assert_eq!(run.stderr.contains(&told), count > 0, "{}", run.stderr);
+        // Words of a type that EVT 3 does not define.
+        let mut bytes = std::fs::read(&path).expect("the file just written");
+        bytes.extend([0x00, 0x10, 0x00, 0xb0, 0x00, 0xc0]);
+        std::fs::write(&path, bytes).expect("room on the disk");
+    }
+}
+
 /// By the camera's clock the first part would lie behind the second, what is between them would be a gap of seconds, and a gyro would
 /// seem twice as fast.
 #[test]
