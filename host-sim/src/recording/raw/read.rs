@@ -1,7 +1,7 @@
 //! Reading RAW.
 
 use evtach_core::Event;
-use evtach_core::decode::{Evt2, Evt3, Evt21};
+use evtach_core::decode::{Counts, Evt2, Evt3, Evt21};
 
 use crate::recording::error::RecordingError;
 use crate::recording::input::Input;
@@ -57,7 +57,7 @@ fn encoding(header: &Header) -> String {
 trait Decoder: Send {
     const WORD_BYTES: usize;
     fn decode(&mut self, words: &[u8], events: &mut Vec<Event>);
-    fn report(&self, side: &mut Side);
+    fn counts(&self) -> Counts;
     fn restart(&mut self);
 }
 
@@ -74,8 +74,8 @@ impl Decoder for Evt2 {
         }
     }
 
-    fn report(&self, side: &mut Side) {
-        side.note(self.counts());
+    fn counts(&self) -> Counts {
+        Self::counts(self)
     }
 }
 
@@ -92,8 +92,8 @@ impl Decoder for Evt3 {
         }
     }
 
-    fn report(&self, side: &mut Side) {
-        side.note(self.counts());
+    fn counts(&self) -> Counts {
+        Self::counts(self)
     }
 }
 
@@ -118,8 +118,8 @@ impl Decoder for Evt21Bytes {
         }
     }
 
-    fn report(&self, side: &mut Side) {
-        side.note(self.decoder.counts());
+    fn counts(&self) -> Counts {
+        self.decoder.counts()
     }
 }
 
@@ -142,6 +142,8 @@ fn is_swapped(input: &mut Input, header: &Header) -> Result<bool, RecordingError
 struct Words<D> {
     input: Input,
     decoder: D,
+    /// What the decoder told of the recordings before the one at hand.
+    earlier: Counts,
     /// Name of the encoding, to compare with that of a further header.
     encoding: String,
     /// Data up to here has been searched for further headers.
@@ -149,8 +151,18 @@ struct Words<D> {
 }
 
 impl<D: Decoder> Words<D> {
-    const fn new(input: Input, decoder: D, encoding: String) -> Self {
-        Self { input, decoder, encoding, searched: 0 }
+    fn new(input: Input, decoder: D, encoding: String) -> Self {
+        Self { input, decoder, earlier: Counts::default(), encoding, searched: 0 }
+    }
+
+    /// What was told since the first recording began.
+    fn counts(&self) -> Counts {
+        let (earlier, now) = (self.earlier, self.decoder.counts());
+        Counts {
+            wraps: earlier.wraps.saturating_add(now.wraps),
+            untimed: earlier.untimed + now.untimed,
+            unknown: earlier.unknown + now.unknown,
+        }
     }
 
     /// Goes past the header of a recording that was put behind the one before; `false` when it is data after all.
@@ -161,6 +173,7 @@ impl<D: Decoder> Words<D> {
             return Ok(false);
         }
         self.input.consume(header.length);
+        self.earlier = self.counts();
         self.decoder.restart();
         side.starts_anew = true;
         side.notes.push(format!("another recording begins at byte {offset}: its time starts anew"));
@@ -192,7 +205,7 @@ impl<D: Decoder> Source for Words<D> {
         let whole = chunk / D::WORD_BYTES * D::WORD_BYTES;
         events.reserve(whole / D::WORD_BYTES);
         self.decoder.decode(&bytes[..whole], events);
-        self.decoder.report(side);
+        side.note(self.counts());
         let rest = chunk - whole;
         if rest > 0 {
             let at = offset + whole as u64;
@@ -201,5 +214,28 @@ impl<D: Decoder> Source for Words<D> {
         }
         self.input.consume(chunk);
         Ok(!last || chunk < available)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_an_earlier_recording_told_is_kept() {
+        // A pixel before the time, a time that wraps, and a word of no type.
+        let words = [0x1000_0000_u32, 0x8fff_ffff, 0x8000_0000, 0x7000_0000];
+        let data: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        let one = [b"% evt 2.0\n% geometry 640x480\n% end\n", data.as_slice()].concat();
+        for recordings in [1, 3] {
+            let mut input = Input::new(Box::new(std::io::Cursor::new(one.repeat(recordings))));
+            let header = Header::peek(&mut input).expect("a header");
+            let mut opened = open(input, header).expect("a RAW file");
+            let (mut events, mut side) = (Vec::new(), Side::default());
+            while opened.source.read(&mut events, &mut side).expect("no damage") {}
+            let expected = recordings as u64;
+            assert_eq!((side.wraps, side.untimed, side.unknown), (expected, expected, expected));
+            assert_eq!(side.notes.len(), recordings - 1, "{:?}", side.notes);
+        }
     }
 }
