@@ -43,7 +43,7 @@ pub struct How {
     gyro: bool,
     /// One standard deviation of the gyro's zero-rate offset; 0.003 where it was calibrated on a still camera. Unless stated, that of
     /// data sheets.
-    #[arg(long, value_name = "RAD/S", value_parser = parse_gyro_sigma)]
+    #[arg(long, value_name = "RAD/S", requires = "gyro", value_parser = parse_gyro_sigma)]
     gyro_sigma: Option<f32>,
 }
 

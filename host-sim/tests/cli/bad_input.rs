@@ -316,6 +316,8 @@ fn bad_usage() {
         vec!["measure", "--window-ms", "1", &good],
         vec!["measure", "--no-such-flag", &good],
         vec!["measure", "--start", "nan", &good],
+        vec!["measure", "--gyro-sigma", "0.003", &good],
+        vec!["plot", "--gyro-sigma", "0.003", &good],
         vec!["convert", "--end", "inf", &good, "-"],
         vec!["no-such-command"],
     ] {
