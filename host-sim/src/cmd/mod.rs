@@ -3,7 +3,7 @@
 use std::io::{ErrorKind, Write as _};
 use std::path::Path;
 
-use anyhow::{Context as _, bail};
+use anyhow::{Context as _, anyhow, bail};
 use evtach_host::recording::{Recording, SHUFFLED};
 
 pub mod bench;
@@ -27,14 +27,27 @@ fn keep_apart(input: &Path, output: &Path) -> anyhow::Result<()> {
     } else {
         input.is_file() && same_file::is_same_file(input, output).unwrap_or(false)
     };
-    if is_same {
-        bail!(
-            "{} is the same file as {}\nhelp: write to another name",
-            output.display(),
-            input.display()
-        );
-    }
-    Ok(())
+    if is_same { Err(same_file(input, output)) } else { Ok(()) }
+}
+
+/// Refuses to write two files to one place, whether there is a file yet or not.
+fn keep_new_apart(one: &Path, other: &Path) -> anyhow::Result<()> {
+    keep_apart(one, other)?;
+    let place = |path: &Path| {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
+        Some(folder.join(path.file_name()?))
+    };
+    let is_same = place(one).is_some_and(|place_of_one| place(other) == Some(place_of_one));
+    if is_same { Err(same_file(one, other)) } else { Ok(()) }
+}
+
+fn same_file(one: &Path, other: &Path) -> anyhow::Error {
+    anyhow!(
+        "{} is the same file as {}\nhelp: write to another name",
+        other.display(),
+        one.display()
+    )
 }
 
 /// Says what is to be known of a recording once it is read.

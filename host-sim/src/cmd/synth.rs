@@ -22,7 +22,7 @@ use evtach_host::synth::presets::Preset;
 use evtach_host::synth::{Model, Scene, Synthetic, generate};
 use serde_json::Value;
 
-use super::{keep_apart, say, tell};
+use super::{keep_apart, keep_new_apart, say, tell};
 use args::{BackdropArgs, MotionArgs, RotorArgs, SensorArgs, set};
 
 /// Arguments of `evtach synth`.
@@ -83,6 +83,15 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     };
     let geometry = Geometry::new(scene.width_px, scene.height_px)
         .context("the sensor's sides have to be 1 to 2048 pixels: correct --geometry")?;
+    let truth = args.truth.clone().or_else(|| truth_path(&args.out));
+    let stdout = Path::new("-");
+    if args.out == stdout && truth.as_deref() == Some(stdout) {
+        bail!("stdout takes either the recording or its truth; give one of them a name");
+    }
+    if let Some(path) = truth.as_deref().filter(|_| args.out != stdout) {
+        // Before anything is written.
+        keep_new_apart(&args.out, path)?;
+    }
     let made = {
         let spinner = indicatif::ProgressBar::new_spinner().with_message("synthesising");
         spinner.enable_steady_tick(std::time::Duration::from_millis(100));
@@ -90,15 +99,11 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         spinner.finish_and_clear();
         made?
     };
-    let truth = args.truth.clone().or_else(|| truth_path(&args.out));
-    let stdout = Path::new("-");
-    if args.out == stdout && truth.as_deref() == Some(stdout) {
-        bail!("stdout takes either the recording or its truth; give one of them a name");
-    }
     let mut writer = create(&args.out, format, geometry)?;
     write(&mut writer, &made)?;
     writer.finish()?;
     if let Some(path) = &truth {
+        // Other names of what was just created are seen only now.
         keep_apart(&args.out, path)?;
         write_truth(path, &made)?;
     }

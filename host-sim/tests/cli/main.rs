@@ -8,6 +8,7 @@ mod demo;
 mod gyro;
 mod parts;
 mod screen;
+mod usage;
 
 use std::path::{Path, PathBuf};
 
