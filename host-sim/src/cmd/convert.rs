@@ -50,6 +50,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         );
     };
     keep_apart(&args.input, &args.output)?;
+    let since_us = args.span.since_us()?;
     let name = args.input.display().to_string();
     let options = args.stated.into();
     let mut recording = recording::open(&args.input, &options).with_context(|| name.clone())?;
@@ -59,7 +60,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let mut writer = write::create(&args.output, format, recording.geometry)
         .with_context(|| args.output.display().to_string())?;
     let bar = progress_bar(&args.input);
-    let mut picker = Picker::new(&args, format);
+    let mut picker = Picker::new(&args, format, since_us);
     let mut chunk: Vec<Event> = Vec::new();
     let mut picked: Vec<Event> = Vec::new();
     let mut samples: Vec<ImuSample> = Vec::new();
@@ -124,8 +125,8 @@ struct Picker {
     rebase: bool,
     latest_us: u64,
     format: WriteFormat,
-    /// Whether only a part is to be kept.
-    is_part: bool,
+    /// The part that is to be kept, in words, where it is not all.
+    part: Option<String>,
     since: Since,
     /// The clock of the inertial samples, which need not come with the events of their time.
     imu_timeline: Timeline,
@@ -147,9 +148,9 @@ struct Picker {
 }
 
 impl Picker {
-    fn new(args: &Args, format: WriteFormat) -> Self {
+    fn new(args: &Args, format: WriteFormat, since_us: Range<u64>) -> Self {
         let (latest_us, ordered) = format.limits();
-        let Range { start: start_us, end: end_us } = args.span.since_us();
+        let Range { start: start_us, end: end_us } = since_us;
         Self {
             roi: args.roi,
             start_us,
@@ -158,7 +159,7 @@ impl Picker {
             rebase: args.rebase,
             latest_us,
             format,
-            is_part: args.roi.is_some() || !args.span.is_all(),
+            part: args.span.part(args.roi),
             since: Since::default(),
             imu_timeline: Timeline::default(),
             first_us: None,
@@ -269,10 +270,8 @@ impl Picker {
     fn report(&self, out_of_bounds: u64) {
         let left_out = self.seen - self.written - self.early;
         tell(format!("{} events written", self.written));
-        if self.seen == 0 && self.is_part {
-            tell(
-                "note: nothing is kept: no event lies between --start and --end inside --roi; widen them",
-            );
+        if let Some(part) = self.part.as_ref().filter(|_| self.seen == 0) {
+            tell(format!("note: nothing is kept: no events {part}; widen what is stated"));
         }
         if left_out > 0 {
             tell(format!("{left_out} events left out by --decimate"));

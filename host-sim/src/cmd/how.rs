@@ -67,6 +67,7 @@ impl How {
         all_stages: bool,
         mut seen: impl FnMut(&[Event], &Timeline),
     ) -> anyhow::Result<Measured> {
+        let since_us = self.span.since_us()?;
         let name = file.display().to_string();
         let options = self.stated.into();
         let mut recording = recording::open(file, &options).with_context(|| name.clone())?;
@@ -77,7 +78,7 @@ impl How {
             settings: Settings { all_stages, ..self.settings(recording.geometry) },
             capacity: self.capacity,
             takes_gyro: self.gyro,
-            since_us: self.span.since_us(),
+            since_us,
         };
         let bar = spinner(&name);
         let run = Run::over(name.clone(), &mut recording, &plan, |events, timeline| {
@@ -104,8 +105,8 @@ impl How {
             ),
             None => {}
         }
-        if run.readings.is_empty() && (!self.span.is_all() || self.roi.is_some()) {
-            bail!("{name}: no events between --start and --end inside --roi; widen them");
+        if let Some(part) = self.span.part(self.roi).filter(|_| run.readings.is_empty()) {
+            bail!("{name}: no events {part}; widen what is stated");
         }
         let Ignored { out_of_order, out_of_roi, overrun, .. } = run.ignored;
         if out_of_order > 0 {

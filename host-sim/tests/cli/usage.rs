@@ -1,6 +1,6 @@
 //! Options that make no sense together.
 
-use super::{assert_refused_as_bad, evtach, folder};
+use super::{assert_refused_as_bad, evtach, folder, rotor, write};
 
 /// Nothing is written where the truth would lie upon the recording.
 #[test]
@@ -19,5 +19,41 @@ fn a_truth_is_not_written_over_its_recording() {
             assert_refused_as_bad(&run, "is the same file as");
         }
         assert_eq!(std::fs::read(&out).ok(), was.map(|bytes| bytes.to_vec()));
+    }
+}
+
+#[test]
+fn a_part_that_ends_before_it_starts_is_refused() {
+    let folder = folder();
+    let file = write(&folder, "rotor.raw", &rotor()).display().to_string();
+    let out = folder.path().join("out.raw");
+    let span = ["--start", "0.4", "--end", "0.25"];
+    let told = "--start 0.4 does not lie before --end 0.25";
+    for command in
+        [&["measure", &file][..], &["plot", &file], &["convert", &file, &out.display().to_string()]]
+    {
+        assert_refused_as_bad(&evtach(&[command, &span].concat(), b""), told);
+    }
+    assert!(!out.exists());
+}
+
+/// What is said to be too narrow was stated.
+#[test]
+fn a_part_without_events_is_told_as_it_was_stated() {
+    let folder = folder();
+    let file = write(&folder, "rotor.raw", &rotor()[..20]).display().to_string();
+    let (start, end) = (&["--start", "100"][..], &["--end", "200"][..]);
+    // A single pixel far from all.
+    let roi = &["--roi", "199,159,1,1"][..];
+    for (options, told) in [
+        (start, "no events from --start on; "),
+        (&[start, end].concat(), "no events between --start and --end; "),
+        (roi, "no events inside --roi; "),
+        (&[end, roi].concat(), "no events before --end inside --roi; "),
+    ] {
+        let run = evtach(&[&["measure", &file], options].concat(), b"");
+        assert_refused_as_bad(&run, told);
+        let run = evtach(&[&["convert", &file, "-", "--to", "csv"], options].concat(), b"");
+        assert!(run.code == Some(0) && run.stderr.contains(told), "{}", run.stderr);
     }
 }
