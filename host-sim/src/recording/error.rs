@@ -65,6 +65,12 @@ pub enum RecordingError {
     /// There is nothing in the file.
     #[error("the file is empty\nhelp: record again, or check that the copy finished")]
     Empty,
+    /// It is a recording, of nothing.
+    #[error("{format} without events\nhelp: record again, or check that the copy finished")]
+    NoEvents {
+        /// Name of the format.
+        format: &'static str,
+    },
     /// The content is no known format.
     #[error("not a recording that is known here: {found}\nhelp: {advice}")]
     Unknown {

@@ -118,7 +118,7 @@ impl<R: Read> Read for Counted<R> {
 fn scan(opened: &mut Opened) -> Result<KnownSize, RecordingError> {
     let mut events: Vec<Event> = Vec::new();
     let (mut x_max, mut y_max) = (0, 0);
-    let (mut any, mut damage) = (false, None);
+    let (mut any, mut any_on_sensor, mut damage) = (false, false, None);
     loop {
         events.clear();
         let more = opened.source.read(&mut events, &mut Side::default()).unwrap_or_else(|error| {
@@ -127,8 +127,9 @@ fn scan(opened: &mut Opened) -> Result<KnownSize, RecordingError> {
         });
         // Others lie outside of any sensor, and are counted when the recording is read for good.
         let on_sensor = |e: &&Event| e.x < Geometry::MAX_PX && e.y < Geometry::MAX_PX;
+        any |= !events.is_empty();
         for event in events.iter().filter(on_sensor) {
-            any = true;
+            any_on_sensor = true;
             x_max = x_max.max(event.x);
             y_max = y_max.max(event.y);
         }
@@ -137,10 +138,13 @@ fn scan(opened: &mut Opened) -> Result<KnownSize, RecordingError> {
         }
     }
     // Damage behind an event will be told when the recording is read for good.
-    if let Some(error) = damage.filter(|_| !any) {
+    if let Some(error) = damage.filter(|_| !any_on_sensor) {
         return Err(error);
     }
-    let found = any
+    if !any {
+        return Err(RecordingError::NoEvents { format: opened.format });
+    }
+    let found = any_on_sensor
         .then(|| geometry::of_extent(x_max.saturating_add(1), y_max.saturating_add(1)))
         .flatten();
     let size = found.ok_or(RecordingError::NoGeometry { format: opened.format })?;
@@ -303,7 +307,14 @@ mod tests {
         assert!(error.to_string().starts_with("CSV, line 2: the time is \"-5\""), "{error}");
         // Behind an event it is told when that has been read.
         assert!(scanned("t,x,y,p\n5,1,2,1\n-6,1,2,0\n").is_ok());
+    }
+
+    #[test]
+    fn where_there_are_no_events_no_size_is_asked_for() {
         let error = scanned("t,x,y,p\n").unwrap_err();
+        assert!(error.to_string().starts_with("CSV without events"), "{error}");
+        // No sensor is as large.
+        let error = scanned("t,x,y,p\n5,5000,7,1\n").unwrap_err();
         assert!(matches!(error, RecordingError::NoGeometry { .. }), "{error}");
     }
 
@@ -322,6 +333,6 @@ mod tests {
     fn a_text_with_its_size_only_has_no_events() {
         let mut opened = recognised("%geometry:640,480\n");
         assert_eq!(opened.geometry.take().map(|known| known.size), Geometry::new(640, 480));
-        assert!(matches!(scan(&mut opened), Err(RecordingError::NoGeometry { .. })));
+        assert!(matches!(scan(&mut opened), Err(RecordingError::NoEvents { .. })));
     }
 }

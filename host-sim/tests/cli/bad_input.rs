@@ -52,7 +52,7 @@ fn header_without_events() {
         assert_refused_as_bad(&measure(&write(&folder, name, &[])), "no events");
     }
     let names = write(&folder, "header.csv", &[]);
-    assert_refused_as_bad(&measure(&names), "does not say the size of the sensor");
+    assert_refused_as_bad(&measure(&names), "CSV without events");
     let run = evtach(&["measure", &names.display().to_string(), "--geometry", "200x160"], b"");
     assert_refused_as_bad(&run, "no events");
 }
