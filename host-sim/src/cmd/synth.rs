@@ -99,7 +99,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         spinner.finish_and_clear();
         made?
     };
-    let mut writer = create(&args.out, format, geometry)?;
+    let mut writer =
+        create(&args.out, format, geometry).with_context(|| args.out.display().to_string())?;
     write(&mut writer, &made)?;
     writer.finish()?;
     if let Some(path) = &truth {

@@ -39,14 +39,9 @@ impl fmt::Display for Place {
 /// Why a recording cannot be read or written; each message ends with what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
-    /// The file cannot be opened or created.
-    #[error("cannot open {path}: {cause}\nhelp: check the path and its permissions")]
-    Open {
-        /// The path as given.
-        path: String,
-        /// What the system said.
-        cause: io::Error,
-    },
+    /// The file cannot be opened or created. Whoever asked for it tells its name, as before any other error.
+    #[error("cannot open: {0}\nhelp: check the path and its permissions")]
+    Open(io::Error),
     /// Reading failed below the format.
     #[error(
         "cannot read on at byte {offset}: {cause}\nhelp: check the disk or the pipe; a compressed file may be cut short"

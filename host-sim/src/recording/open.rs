@@ -76,15 +76,14 @@ fn input(path: &Path, progress: &Progress) -> Result<Input, RecordingError> {
     if path.as_os_str() == "-" {
         return Ok(Input::new(Box::new(Counted { reader: std::io::stdin(), read })));
     }
-    let opening = |cause| RecordingError::Open { path: path.display().to_string(), cause };
-    if std::fs::metadata(path).map_err(opening)?.is_dir() {
+    if std::fs::metadata(path).map_err(RecordingError::Open)?.is_dir() {
         return Err(RecordingError::Unsupported {
             what: "this is a folder".to_owned(),
             advice: "give the recording in it; of a ROS 2 bag the .db3 or .mcap file".to_owned(),
         });
     }
     read.store(0, Ordering::Relaxed);
-    let file = File::open(path).map_err(opening)?;
+    let file = File::open(path).map_err(RecordingError::Open)?;
     Ok(Input::new(Box::new(Counted { reader: file, read })))
 }
 

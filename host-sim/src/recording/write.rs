@@ -165,8 +165,7 @@ pub fn create(
     let target = if path.as_os_str() == "-" {
         Target::Pipe(Box::new(BufWriter::new(std::io::stdout())))
     } else {
-        let file = File::create(path)
-            .map_err(|cause| RecordingError::Open { path: path.display().to_string(), cause })?;
+        let file = File::create(path).map_err(RecordingError::Open)?;
         // A pipe may have a name, too, as `>(...)` of a shell.
         if file.metadata().is_ok_and(|found| found.is_file()) {
             Target::File(BufWriter::with_capacity(1 << 18, file))

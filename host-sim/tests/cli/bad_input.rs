@@ -273,8 +273,19 @@ fn all_on_polarity() {
 #[test]
 fn missing_file_and_folder() {
     let folder = folder();
-    assert_refused_as_bad(&measure(&folder.path().join("missing.raw")), "missing.raw");
+    let missing = folder.path().join("missing.raw");
+    let run = measure(&missing);
+    assert_refused_as_bad(&run, "missing.raw: cannot open: ");
+    assert_eq!(run.stderr.matches("missing.raw").count(), 1, "{}", run.stderr);
     assert_refused_as_bad(&measure(folder.path()), "this is a folder");
+    // Nor is there a folder to write to.
+    let good = write(&folder, "good.raw", &rotor()).display().to_string();
+    let out = missing.join("out.raw").display().to_string();
+    for command in [&["convert", &good, &out][..], &["synth", &out, "--duration-ms", "5"]] {
+        let run = evtach(command, b"");
+        assert_refused_as_bad(&run, "cannot open: ");
+        assert_eq!(run.stderr.matches(&out).count(), 1, "{}", run.stderr);
+    }
 }
 
 /// The good one is measured all the same; the exit code is the largest.

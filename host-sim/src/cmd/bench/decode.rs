@@ -97,7 +97,8 @@ fn make_up(folder: &Path, mega_events: u32) -> anyhow::Result<Vec<PathBuf>> {
                 other => other.as_str(),
             };
             let path = folder.join(format!("events.{extension}"));
-            let mut writer = write::create(&path, format, MADE_UP)?;
+            let mut writer = write::create(&path, format, MADE_UP)
+                .with_context(|| path.display().to_string())?;
             writer.write(&events)?;
             writer.finish()?;
             Ok(path)

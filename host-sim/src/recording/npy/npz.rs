@@ -124,8 +124,7 @@ fn members(path: &Path) -> Result<Vec<Member>, RecordingError> {
 }
 
 fn file(path: &Path) -> Result<File, RecordingError> {
-    File::open(path)
-        .map_err(|cause| RecordingError::Open { path: path.display().to_string(), cause })
+    File::open(path).map_err(RecordingError::Open)
 }
 
 fn input(path: &Path, member: &Member) -> Result<Input, RecordingError> {
