@@ -7,7 +7,7 @@ use evtach_core::{Event, GyroSample, Ignored, Reading, Settings};
 use super::letters::Letters;
 use super::pause::Pauses;
 use super::wait::Wait;
-use super::{Capacity, FileFacts, Ties, Timeline, drain, feed, with_tachometer};
+use super::{Capacity, FileFacts, Since, Ties, Timeline, drain, feed, with_tachometer};
 use crate::recording::{ImuSample, Recording, RecordingError};
 
 /// How a recording is to be measured.
@@ -64,6 +64,7 @@ impl Run {
             let since_us = plan.since_us.clone();
             let mut chosen = Chosen {
                 since_us,
+                since: Since::default(),
                 origin_us: None,
                 is_inside: plan.since_us.start == 0,
                 starts_anew: true,
@@ -119,6 +120,7 @@ impl Run {
                 if let Some(t_us) = set_back_us {
                     if parts.timeline.starts_anew() {
                         letters.start_anew();
+                        chosen.since.start_anew();
                         chosen.starts_anew = true;
                     }
                     if parts.timeline.set_back_to(t_us) {
@@ -140,6 +142,8 @@ impl Run {
 /// The part of a recording that is to be measured.
 struct Chosen<'a, S> {
     since_us: Range<u64>,
+    /// Not the timeline: behind a wrong time far ahead, that lays what follows as far ahead.
+    since: Since,
     /// The first event of all.
     origin_us: Option<u64>,
     /// Whether the last event so far was of the part: what is lost then is lost of it.
@@ -154,12 +158,13 @@ impl<S: FnMut(&[Event], &Timeline)> Chosen<'_, S> {
     /// Leaves of the next events those of the part, and counts them.
     fn leave(&mut self, events: &mut Vec<Event>, timeline: &Timeline) {
         let Some(first) = events.first() else { return };
-        let origin_us = *self.origin_us.get_or_insert(first.t_us);
-        self.facts.origin_us = origin_us;
-        let since_us = |event: &Event| timeline.at(event.t_us).saturating_sub(origin_us);
-        self.is_inside =
-            events.last().is_some_and(|event| self.since_us.contains(&since_us(event)));
-        events.retain(|event| self.since_us.contains(&since_us(event)));
+        self.facts.origin_us = *self.origin_us.get_or_insert(first.t_us);
+        if self.since_us != (0..u64::MAX) {
+            events.retain(|event| {
+                self.is_inside = self.since_us.contains(&self.since.of(event));
+                self.is_inside
+            });
+        }
         let (Some(first), Some(last)) = (events.first(), events.last()) else { return };
         if self.facts.events == 0 {
             self.facts.first_us = timeline.at(first.t_us);

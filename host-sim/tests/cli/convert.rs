@@ -148,6 +148,13 @@ fn a_wrong_time_among_right_ones_loses_nothing_unsaid() {
     let from = file(&folder, "in.csv", WriteFormat::Csv, &events);
     let run = evtach(&["convert", &from, "-", "--to", "csv", "--end", "60"], b"");
     assert_eq!(run.stdout.lines().count(), right, "{}", run.stderr);
+    // A part behind it is that of either command.
+    let part = ["--start", "0.05", "--end", "0.12"];
+    let kept = evtach(&[&["convert", &from, "-", "--to", "csv"], &part[..]].concat(), b"");
+    let measured = evtach(&[&["measure", "--json", &from], &part[..]].concat(), b"");
+    assert_eq!(measured.code, Some(0), "{}", measured.stderr);
+    let told = format!("\"events\":{},", kept.stdout.lines().count() - 1);
+    assert!(measured.stdout.contains(&told), "{told}: {}", measured.stdout);
     // As the first one it would be where time begins.
     events.swap(0, right / 10);
     let from = file(&folder, "late.csv", WriteFormat::Csv, &events);
