@@ -103,8 +103,11 @@ impl<'m> Store<'m> {
     /// Forgets everything; the next segment starts at `start_us`. Returns how many events went that no window had measured.
     pub fn restart(&mut self, start_us: u64, segment_us: u32) -> u64 {
         let unmeasured = (0..=self.closed).map(|index| self.forget(index)).sum();
+        // What was lost since the last segment was closed was told before the event that begins this one.
+        let lost = self.segments[self.slot(self.closed)].lost;
         self.segments = [Segment::default(); MOST_SEGMENTS];
         self.closed = 0;
+        self.lost(lost);
         self.held = Held::default();
         self.start_us = start_us;
         self.began_us = start_us;

@@ -69,6 +69,22 @@ fn what_a_sensor_looks_at_too_seldom_is_not_told() {
     evtach_tests::show(&format!("looked at too seldom: {refused} of 12 told nothing"));
 }
 
+/// A link that lets through bursts, as one look does that lasts long: speeds of six times as many turns were told, locked.
+#[test]
+fn what_comes_in_bursts_that_are_too_far_apart_is_not_told() {
+    let (events, geometry) = fan(1500.0, 3, 400.0);
+    for (period_us, open_us) in [(8333, 200), (5000, 170), (8200, 400)] {
+        let bursts: Vec<Event> =
+            events.iter().copied().filter(|event| event.t_us % period_us < open_us).collect();
+        for capacity in Capacity::ALL {
+            let told = speeds_rpm(&bursts, geometry, capacity);
+            let most_rpm = told.iter().fold(0.0_f32, |most, rpm| most.max(rpm.abs()));
+            // Slower ones than the bursts may come of more blades than there are.
+            assert!(most_rpm < 1600.0, "{open_us} of {period_us} us, {capacity:?}: {told:?}");
+        }
+    }
+}
+
 /// Nor is anything taken from what is seen when it happens, however fast it passes.
 #[test]
 fn what_passes_fast_is_told_where_the_sensor_looks_all_the_time() {

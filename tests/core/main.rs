@@ -4,6 +4,7 @@ mod approach;
 mod folding;
 mod hostile_events;
 mod late;
+mod losses;
 mod properties;
 mod still;
 mod thinned;

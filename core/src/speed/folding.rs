@@ -2,7 +2,8 @@
 //! time of the look. Then a pattern that passes n times between two looks looks like one that passes n - 1 times, or that goes
 //! backwards: what is faster than half the rate of the looks is told by nothing (Nyquist's limit), and all witnesses agree on it.
 //!
-//! The looks of a row have a shortest distance; times of their own come as close to each other as chance brings them.
+//! The looks of a row have a shortest distance; times of their own come as close to each other as chance brings them. A link that lets
+//! through bursts folds as well; these fill less of the time than events would by chance.
 
 use crate::rotors::Disc;
 use crate::store::Window;
@@ -17,6 +18,10 @@ const LEAST_LOOKS: u32 = 12;
 const BEYOND_CHANCE: f32 = 5.0;
 /// Of more lines that are looked at sooner, the rest are not nearly all.
 const MOST_SOONER: u32 = LINES as u32 / 4;
+
+/// Share of the times that as many events would be in by chance below which they come in bursts. Those of a single mark that shows in a
+/// quarter of its way around are in half of them.
+const LEAST_FILLED: f32 = 0.4;
 
 /// The looks at one row or column.
 #[derive(Clone, Copy)]
@@ -56,6 +61,27 @@ pub fn looks_seldom(window: &Window<'_>, disc: Disc, most_us: f32) -> bool {
         }
     }
     [&columns[..], &rows, &all].iter().any(|lines| is_regular(lines, window, most_us))
+}
+
+/// Whether events come in bursts that are farther apart than `most_us`. Cost: some ten instructions an event.
+#[must_use]
+// Not inlined: flash is short.
+#[inline(never)]
+pub fn comes_in_bursts(window: &Window<'_>, most_us: f32) -> bool {
+    let (mut events, mut filled, mut last) = (0.0, 0.0, u32::MAX);
+    for segment in 0..window.segments() {
+        for event in window.segment(segment) {
+            let time = (event.since(window.start_us) as f32 / most_us) as u32;
+            events += 1.0;
+            if time != last {
+                filled += 1.0;
+                last = time;
+            }
+        }
+    }
+    let times = window.duration_us as f32 / most_us;
+    // Of so many times so many events fill 1 - exp(-events / times), which is no less than this.
+    filled * (events + times) < LEAST_FILLED * times * events
 }
 
 /// Takes in an event of a line, if it is of one of these; 1 where that shows the line to be looked at sooner, else 0.

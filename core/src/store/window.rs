@@ -44,6 +44,9 @@ impl Store<'_> {
     }
 }
 
+/// Share of events lost beyond which the rest is not trusted.
+const MOST_LOST: f32 = 0.5;
+
 /// Where the events of a window went.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Account {
@@ -59,6 +62,12 @@ pub struct Account {
 }
 
 impl Account {
+    /// Whether so many were lost that the rest is not trusted.
+    #[must_use]
+    pub fn is_mostly_lost(&self) -> bool {
+        self.lost as f32 > MOST_LOST * self.counted.saturating_add(self.lost) as f32
+    }
+
     /// Mean roll rate of the camera in rad/s, where a gyro was heard.
     #[must_use]
     pub fn roll_rad_s(&self) -> Option<f32> {

@@ -29,8 +29,6 @@ const WINDOWS_US: [u32; 9] = [
 const SEARCH_AGAIN: u8 = 2;
 /// Fewest events in a window that are looked at.
 const LEAST_EVENTS: u64 = 300;
-/// Share of events lost beyond which the rest is not trusted.
-const MOST_LOST: f32 = 0.5;
 
 /// Longest windows that are refused before the window begins short again, and that show nothing: two seconds show no blades that
 /// pass more than 256 times a second. What turns slowly shows in part of one, and then has the next ones, which move on by a third.
@@ -75,11 +73,14 @@ impl Tachometer<'_> {
             let id = self.tracker.identify(outcome, start_us, window_us);
             rotors.push(rotor_reading(id, outcome, self.settings.blades, roll)).ok();
         }
-        // What rested for a part of the window, or turned with another speed there, is followed all the same, but not told.
+        // What rested for a part of the window, or turned with another speed there, is followed all the same, but not told. Nor is what
+        // few events are left of: those that go missing every so often leave another speed.
         let known = self.best_status(&account, &rotors);
+        let mostly_lost = account.is_mostly_lost();
+        let untold = if mostly_lost { Reason::Saturated } else { Reason::Ambiguous };
         for (rotor, outcome) in rotors.iter_mut().zip(&self.outcomes) {
-            if outcome.lapsed && rotor.speed.take().is_some() {
-                rotor.status = Status::Refused(Reason::Ambiguous);
+            if (outcome.lapsed || mostly_lost) && rotor.speed.take().is_some() {
+                rotor.status = Status::Refused(untold);
             }
         }
         sort_few(&mut rotors, |a, b| a.id < b.id);
@@ -106,16 +107,14 @@ impl Tachometer<'_> {
     // Not inlined: flash is short.
     #[inline(never)]
     fn best_status(&self, account: &Account, rotors: &[RotorReading]) -> Status {
-        let lost =
-            account.lost as f32 > MOST_LOST * account.counted.saturating_add(account.lost) as f32;
         let has = |status: Status| rotors.iter().any(|rotor| rotor.status == status);
         let told = rotors.iter().any(|rotor| rotor.speed.is_some());
-        if account.counted == 0 {
+        if account.is_mostly_lost() && !told {
+            Status::Refused(Reason::Saturated)
+        } else if account.counted == 0 {
             Status::Refused(Reason::NoEvents)
         } else if account.counted < LEAST_EVENTS && !told {
             Status::Refused(Reason::TooFewEvents)
-        } else if lost && !told {
-            Status::Refused(Reason::Saturated)
         } else if has(Status::Locked) {
             Status::Locked
         } else if has(Status::Coarse) {

@@ -8,7 +8,7 @@ use crate::reading::{Evidence, Reason, Status};
 use crate::settings::Settings;
 use crate::speed::angular::AngularSums;
 use crate::speed::filling::Filling;
-use crate::speed::folding::looks_seldom;
+use crate::speed::folding::{comes_in_bursts, looks_seldom};
 use crate::speed::queue::{Busy, busy, held};
 use crate::speed::statistics::root_sum_square;
 use crate::store::Window;
@@ -236,7 +236,9 @@ impl Measurement {
     fn is_folded(&self, window: &Window<'_>) -> bool {
         let windings = self.parts.filter(|_| self.alike).map_or(self.windings, u32::from);
         let passes_hz = windings as f32 * self.omega_rad_s.abs() / TAU;
-        passes_hz > SLOW_HZ && looks_seldom(window, self.disc, 0.5e6 / passes_hz)
+        let most_us = 0.5e6 / passes_hz;
+        comes_in_bursts(window, most_us)
+            || passes_hz > SLOW_HZ && looks_seldom(window, self.disc, most_us)
     }
 
     /// Whether the lock bears the phase out, and the rotor is where it should be between whole periods.
