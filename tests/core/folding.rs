@@ -69,7 +69,7 @@ fn what_a_sensor_looks_at_too_seldom_is_not_told() {
     evtach_tests::show(&format!("looked at too seldom: {refused} of 12 told nothing"));
 }
 
-/// A link that lets through bursts, as one look does that lasts long: speeds of six times as many turns were told, locked.
+/// A link that lets through bursts, as one look does that lasts long: speeds six and seven times as high were told, locked.
 #[test]
 fn what_comes_in_bursts_that_are_too_far_apart_is_not_told() {
     let (events, geometry) = fan(1500.0, 3, 400.0);
