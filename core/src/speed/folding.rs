@@ -2,8 +2,8 @@
 //! time of the look. Then a pattern that passes n times between two looks looks like one that passes n - 1 times, or that goes
 //! backwards: what is faster than half the rate of the looks is told by nothing (Nyquist's limit), and all witnesses agree on it.
 //!
-//! The looks of a row have a shortest distance; times of their own come as close to each other as chance brings them. A link that lets
-//! through bursts folds as well; these fill less of the time than events would by chance.
+//! The looks of a row have a shortest distance; times of their own come as close to each other as chance brings them. A link or a lamp
+//! that lets through bursts folds as well, and even less is known of what passes in between.
 
 use crate::math::floor;
 use crate::rotors::Disc;
@@ -20,9 +20,16 @@ const BEYOND_CHANCE: f32 = 5.0;
 /// Of more lines that are looked at sooner, the rest are not nearly all.
 const MOST_SOONER: u32 = LINES as u32 / 4;
 
-/// Share of the times that as many events would be in by chance below which they come in bursts. Those of a single mark that shows in a
-/// quarter of its way around are in half of them.
-const LEAST_FILLED: f32 = 0.4;
+/// Times that hold an event or none, of which bursts fill less than half.
+const SLOT_US: u32 = 200;
+/// Fewest bursts that are told to be regular.
+const LEAST_BURSTS: u32 = 8;
+/// Sensors come round sooner.
+const SCAN_US: f32 = 1000.0;
+/// What a look finds is stamped with one time; what is let through takes longer than this.
+const STAMPED_US: f32 = 20.0;
+/// What a rotor's own bursts and its turns may be apart by, over all of them.
+const OWN_TURNS: f32 = 0.1;
 
 /// The looks at one row or column.
 #[derive(Clone, Copy)]
@@ -64,31 +71,69 @@ pub fn looks_seldom(window: &Window<'_>, disc: Disc, most_us: f32) -> bool {
     [&columns[..], &rows, &all].iter().any(|lines| is_regular(lines, window, most_us))
 }
 
-/// Whether events come in bursts that are farther apart than `most_us`. Cost: some five instructions an event, until most of the times are
-/// known to be filled.
+/// Whether events come in bursts, as regular as a clock's, that the rotor does not make: its own come once or twice a turn or a pass. A sensor that
+/// scans comes round within [`SCAN_US`], and may not be seen to pass faster than half as often; what is let through by something else
+/// may pass any number of times in between. Cost: some ten instructions an event, until half of the time is known to be filled.
 #[must_use]
 // Not inlined: flash is short.
 #[inline(never)]
-pub fn comes_in_bursts(window: &Window<'_>, most_us: f32) -> bool {
-    let times = window.duration_us as f32 / most_us;
-    let (mut events, mut filled, mut end_us) = (0.0, 0.0, 0);
+pub fn comes_in_bursts(window: &Window<'_>, most_us: f32, turn_us: f32) -> bool {
+    let Some(longest_us) = longest_gap_us(window) else { return false };
+    let (mut bursts, mut steady, mut closed_us) = (0_u32, 0_u32, 0_u32);
+    let (mut first_us, mut burst_us, mut period_us, mut last_us) = (0_u32, 0_u32, 0_u32, 0_u32);
     for segment in 0..window.segments() {
-        let stored = window.segment(segment);
-        for event in stored {
+        for event in window.segment(segment) {
+            let t_us = event.since(window.start_us).unsigned_abs();
+            let gap_us = t_us.saturating_sub(last_us);
+            last_us = t_us;
+            if gap_us < longest_us / 2 {
+                continue;
+            }
+            if bursts == 0 {
+                first_us = t_us;
+            } else {
+                closed_us = closed_us.saturating_add(gap_us);
+                let after_us = t_us.wrapping_sub(burst_us);
+                steady += u32::from(period_us.abs_diff(after_us) < period_us / 5);
+                period_us = after_us;
+            }
+            burst_us = t_us;
+            bursts += 1;
+        }
+    }
+    if bursts < LEAST_BURSTS || 8 * steady < 7 * (bursts - 2) {
+        return false;
+    }
+    let all_us = burst_us.wrapping_sub(first_us) as f32;
+    let periods = (bursts - 1) as f32;
+    let period_us = all_us / periods;
+    let to_a_turn = turn_us / period_us;
+    let whole = floor(to_a_turn + 0.5);
+    let passes = floor(0.5 * turn_us / most_us + 0.5);
+    let is_own = [1.0, 2.0, passes, 2.0 * passes].contains(&whole)
+        && (to_a_turn - whole).abs() * all_us < OWN_TURNS * turn_us;
+    let is_stamped = all_us - (closed_us as f32) < STAMPED_US * periods;
+    !is_own && !is_stamped && (period_us > SCAN_US || period_us > most_us)
+}
+
+/// The longest time without an event, where half of the time or more has none.
+fn longest_gap_us(window: &Window<'_>) -> Option<u32> {
+    let (mut filled_us, mut end_us, mut last_us, mut longest_us) = (0, 0, 0, 0);
+    for segment in 0..window.segments() {
+        for event in window.segment(segment) {
             let t_us = event.since(window.start_us).unsigned_abs();
             if t_us >= end_us {
-                filled += 1.0;
-                if filled >= LEAST_FILLED * times {
-                    return false;
+                filled_us += SLOT_US;
+                if filled_us > window.duration_us / 2 {
+                    return None;
                 }
-                // Rounded up: what comes then is of the next time, and no event counts twice.
-                end_us = ((floor(t_us as f32 / most_us) + 1.0) * most_us) as u32 + 1;
+                end_us = (t_us / SLOT_US + 1) * SLOT_US;
             }
+            longest_us = longest_us.max(t_us.saturating_sub(last_us));
+            last_us = t_us;
         }
-        events += stored.len() as f32;
     }
-    // Of so many times so many events fill 1 - exp(-events / times), which is no less than this.
-    filled * (events + times) < LEAST_FILLED * times * events
+    Some(longest_us)
 }
 
 /// Takes in an event of a line, if it is of one of these; 1 where that shows the line to be looked at sooner, else 0.
