@@ -90,7 +90,9 @@ impl PacketDecoder {
                 side.note(decoder.counts());
             }
             Self::Libcaer => libcaer(bytes, packet.time_base_ns, events, side),
-            Self::LibcaerCompressed => libcaer_compressed(bytes, packet.time_base_ns, events),
+            Self::LibcaerCompressed => {
+                libcaer_compressed(bytes, packet.time_base_ns, events, side);
+            }
             Self::Mono => mono(bytes, packet.time_base_ns, events),
         }
         Ok(())
@@ -117,7 +119,7 @@ fn libcaer(bytes: &[u8], mut base_ns: u64, events: &mut Vec<Event>, side: &mut S
     }
 }
 
-fn libcaer_compressed(bytes: &[u8], base_ns: u64, events: &mut Vec<Event>) {
+fn libcaer_compressed(bytes: &[u8], base_ns: u64, events: &mut Vec<Event>, side: &mut Side) {
     let (mut high, mut low, mut x, mut base_y) = (0_u64, 0_u64, 0, 0_u16);
     let mut base_polarity = Polarity::Off;
     for word in bytes.as_chunks().0 {
@@ -147,7 +149,7 @@ fn libcaer_compressed(bytes: &[u8], base_ns: u64, events: &mut Vec<Event>) {
                 }));
                 base_y = base_y.wrapping_add(8);
             }
-            _ => {}
+            _ => side.unknown += 1,
         }
     }
 }
@@ -169,6 +171,10 @@ mod tests {
     use super::*;
 
     fn decode(encoding: &str, base_ns: u64, bytes: &[u8]) -> Vec<Event> {
+        decode_beside(encoding, base_ns, bytes, &mut Side::default())
+    }
+
+    fn decode_beside(encoding: &str, base_ns: u64, bytes: &[u8], side: &mut Side) -> Vec<Event> {
         let packet = EventPacket {
             frame_id: "",
             height: 480,
@@ -181,7 +187,7 @@ mod tests {
         };
         let mut events = Vec::new();
         let mut decoder = PacketDecoder::new(encoding).expect("a known encoding");
-        decoder.decode(&packet, &mut events, &mut Side::default()).expect("a good packet");
+        decoder.decode(&packet, &mut events, side).expect("a good packet");
         events
     }
 
@@ -200,6 +206,17 @@ mod tests {
         let events = decode("libcaer_cmp", 1_000_000, &words.map(u16::to_le_bytes).concat());
         let at = |y, polarity| Event { t_us: 1000 + 0x1002, x: 5, y, polarity };
         assert_eq!(events, [at(7, Polarity::On), at(16, Polarity::Off), at(23, Polarity::Off)]);
+    }
+
+    /// As those of EVT 2, 2.1 and 3 are; packet after packet.
+    #[test]
+    fn compressed_words_of_unknown_type_are_counted() {
+        let mut side = Side::default();
+        let bytes = [0x0001_u16, 0x7002, 0x2005, 0x3807, 0xf010].map(u16::to_le_bytes).concat();
+        for packets in 1..=2 {
+            let events = decode_beside("libcaer_cmp", 0, &bytes, &mut side);
+            assert_eq!((events.len(), side.unknown), (1, 2 * packets));
+        }
     }
 
     #[test]
