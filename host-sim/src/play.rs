@@ -3,7 +3,7 @@
 use evtach_core::{Event, Settings, Tachometer};
 use evtach_firmware::instrument::{Instrument, Picture, Sensor, Traffic};
 
-use crate::measure::{Capacity, Since, drain, feed, with_tachometer};
+use crate::measure::{Capacity, Parts, Since, drain, feed, with_tachometer};
 use crate::recording::{Recording, RecordingError};
 
 /// How often the instrument is told the time.
@@ -38,38 +38,35 @@ pub fn play(
     with_tachometer(settings, Capacity::Device, |tachometer| {
         let mut player =
             Player { tachometer, instrument, traffic: Traffic::default(), picture_us: None };
-        let mut chunk: Vec<Event> = Vec::new();
-        let mut since = Since::default();
+        let (mut part, mut since, mut beyond) = (Vec::new(), Since::default(), 0);
         let mut played = Played { duration_us: 0, is_whole: true, damage: None };
-        loop {
-            chunk.clear();
-            let read = recording.read_chunk(&mut chunk);
-            let before = chunk.len();
-            chunk.retain(|event| {
+        let mut parts = Parts::of(recording, Capacity::Device);
+        while !parts.is_done() && beyond < Since::MOST_WRONG {
+            let set_back_us = parts.next(&mut part);
+            part.retain(|event| {
                 let since_us = since.of(event);
                 let is_wanted = until_us.is_none_or(|until_us| since_us <= until_us);
                 if is_wanted {
                     played.duration_us = played.duration_us.max(since_us);
                 }
+                beyond = if is_wanted { 0 } else { beyond + 1 };
+                played.is_whole &= is_wanted;
                 is_wanted
             });
-            let cut = before > 0 && chunk.is_empty();
-            played.is_whole &= chunk.len() == before;
-            player.lost(recording.lost());
-            player.events(&chunk);
-            if recording.starts_anew() {
-                since.start_anew();
-                player.tachometer.configure(settings);
-            }
-            match read {
-                Ok(true) if !cut => {}
-                Ok(_) => break,
-                Err(error) if player.traffic.events == 0 => return Err(error),
-                Err(error) => {
-                    played.damage = Some(error);
-                    break;
+            player.lost(parts.newly_lost());
+            player.events(&part);
+            if let Some(t_us) = set_back_us {
+                if parts.timeline.starts_anew() {
+                    since.start_anew();
+                }
+                if parts.set_back_to(t_us) {
+                    player.tachometer.configure(settings);
                 }
             }
+        }
+        match parts.damage {
+            Some(damage) if player.traffic.events == 0 => return Err(damage),
+            damage => played.damage = damage,
         }
         player.take_picture();
         if until_us.is_none() {
@@ -90,8 +87,8 @@ struct Player<'p, 'm> {
 
 impl Player<'_, '_> {
     fn lost(&mut self, lost: u64) {
-        self.tachometer.lost(lost.saturating_sub(self.traffic.lost));
-        self.traffic.lost = lost;
+        self.tachometer.lost(lost);
+        self.traffic.lost += lost;
     }
 
     fn events(&mut self, events: &[Event]) {

@@ -3,6 +3,7 @@
 mod json;
 mod letters;
 mod mean;
+mod parts;
 mod pause;
 mod run;
 mod since;
@@ -21,6 +22,8 @@ use evtach_core::{
 };
 
 use ties::Ties;
+
+pub(crate) use parts::Parts;
 
 pub use json::{Document, FileFacts, PROGRAM, ReadingRow, RotorRow, SettingsRow, letter};
 pub use run::{Plan, Run};

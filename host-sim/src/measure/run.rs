@@ -7,7 +7,7 @@ use evtach_core::{Event, GyroSample, Ignored, Reading, Settings};
 use super::letters::Letters;
 use super::pause::Pauses;
 use super::wait::Wait;
-use super::{Capacity, FileFacts, Since, Ties, Timeline, drain, feed, with_tachometer};
+use super::{Capacity, FileFacts, Parts, Since, Timeline, drain, feed, with_tachometer};
 use crate::recording::{ImuSample, Recording, RecordingError};
 
 /// How a recording is to be measured.
@@ -71,7 +71,7 @@ impl Run {
                 facts: &mut facts,
                 seen,
             };
-            let (mut part, mut known_lost) = (Vec::new(), 0);
+            let mut part = Vec::new();
             let mut letters = Letters::default();
             let (mut rolls, mut wait) = (Vec::<GyroSample>::new(), Wait::default());
             let mut rolled_us = 0;
@@ -79,8 +79,7 @@ impl Run {
             while !parts.is_done() {
                 let set_back_us = parts.next(&mut part);
                 chosen.leave(&mut part, &parts.timeline);
-                let lost = parts.recording.lost() - known_lost;
-                known_lost += lost;
+                let lost = parts.newly_lost();
                 if chosen.is_inside {
                     tachometer.lost(lost);
                     chosen.facts.lost += lost;
@@ -123,7 +122,7 @@ impl Run {
                         chosen.since.start_anew();
                         chosen.starts_anew = true;
                     }
-                    if parts.timeline.set_back_to(t_us) {
+                    if parts.set_back_to(t_us) {
                         tachometer.configure(plan.settings);
                     }
                     (wait, rolled_us) = (Wait::default(), 0);
@@ -179,67 +178,6 @@ impl<S: FnMut(&[Event], &Timeline)> Chosen<'_, S> {
         }
         self.facts.events += events.len() as u64;
         (self.seen)(events, timeline);
-    }
-}
-
-/// The events of a recording in parts, across none of which its clock is set back.
-struct Parts<'a> {
-    recording: &'a mut Recording,
-    ties: Option<Ties>,
-    timeline: Timeline,
-    /// What was read, and how much of it was handed out.
-    events: Vec<Event>,
-    taken: usize,
-    more: bool,
-    events_read: u64,
-    damage: Option<RecordingError>,
-}
-
-impl<'a> Parts<'a> {
-    fn of(recording: &'a mut Recording, capacity: Capacity) -> Self {
-        Self {
-            recording,
-            ties: (capacity == Capacity::Full).then(Ties::default),
-            timeline: Timeline::default(),
-            events: Vec::new(),
-            taken: 0,
-            more: true,
-            events_read: 0,
-            damage: None,
-        }
-    }
-
-    const fn is_done(&self) -> bool {
-        !self.more && self.taken == self.events.len()
-    }
-
-    /// Puts the next events in place of `part`. Where the clock is set back, there are none, and the time that it is set to is told.
-    fn next(&mut self, part: &mut Vec<Event>) -> Option<u64> {
-        if self.taken == self.events.len() {
-            if self.recording.starts_anew() {
-                self.timeline.start_anew();
-            }
-            self.read();
-        }
-        let rest = &self.events[self.taken..];
-        let length = self.timeline.part(rest);
-        part.clear();
-        part.extend_from_slice(&rest[..length]);
-        self.taken += length;
-        rest.first().filter(|_| length == 0).map(|event| event.t_us)
-    }
-
-    fn read(&mut self) {
-        self.events.clear();
-        self.taken = 0;
-        self.more = self.recording.read_chunk(&mut self.events).unwrap_or_else(|damage| {
-            self.damage = Some(damage);
-            false
-        });
-        self.events_read += self.events.len() as u64;
-        if let Some(ties) = &mut self.ties {
-            ties.order(&mut self.events, self.more && !self.recording.starts_anew());
-        }
     }
 }
 

@@ -20,7 +20,7 @@ pub struct Since {
 
 impl Since {
     /// So many events behind a leap are no wrong times among right ones.
-    const MOST_WRONG: u64 = 65_536;
+    pub(crate) const MOST_WRONG: u64 = 65_536;
 
     /// Says that what comes next is another recording.
     pub const fn start_anew(&mut self) {

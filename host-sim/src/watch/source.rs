@@ -8,11 +8,11 @@ use std::sync::mpsc::{self, Receiver, SyncSender};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use evtach_core::{Event, Settings};
+use evtach_core::Settings;
 use serial2::SerialPort;
 
 use super::Told;
-use crate::measure::{Capacity, ReadingRow, Timeline, drain, feed, with_tachometer};
+use crate::measure::{Capacity, Parts, ReadingRow, drain, feed, with_tachometer};
 use crate::recording::{Recording, SHUFFLED};
 
 /// Readings on their way to the screen.
@@ -93,50 +93,34 @@ pub fn file(mut recording: Recording, speed: f64) -> Source {
         let settings = Settings::new(recording.geometry);
         with_tachometer(settings, Capacity::Device, |tachometer| {
             let start = Instant::now();
-            let mut first_us = None;
-            let mut lost = 0;
-            let mut chunk: Vec<Event> = Vec::new();
-            let (mut timeline, mut end) = (Timeline::default(), Told::End);
-            loop {
-                chunk.clear();
-                let more = recording.read_chunk(&mut chunk).unwrap_or_else(|error| {
-                    end = Told::Failure(error.to_string());
-                    false
-                });
+            let (mut first_us, mut part) = (None, Vec::new());
+            let mut parts = Parts::of(&mut recording, Capacity::Device);
+            while !parts.is_done() {
+                let set_back_us = parts.next(&mut part);
                 // Of what is out of order so far no reading is right.
-                if recording.is_shuffled() {
-                    chunk.clear();
+                if parts.recording.is_shuffled() {
+                    part.clear();
                 }
-                tachometer.lost(recording.lost() - lost);
-                lost = recording.lost();
-                for piece in chunk.chunk_by(|a, b| a.t_us / PIECE_US == b.t_us / PIECE_US) {
+                tachometer.lost(parts.newly_lost());
+                for piece in part.chunk_by(|a, b| a.t_us / PIECE_US == b.t_us / PIECE_US) {
                     let Some(last) = piece.last() else { continue };
-                    // No piece is as long as a clock is set back by.
-                    if timeline.part(piece) == 0 {
-                        if timeline.set_back_to(piece[0].t_us) {
-                            tachometer.configure(settings);
-                        }
-                        timeline.part(piece);
-                    }
                     let first_us = *first_us.get_or_insert(piece[0].t_us);
-                    let since_us = timeline.at(last.t_us).saturating_sub(first_us);
+                    let since_us = parts.timeline.at(last.t_us).saturating_sub(first_us);
                     let due_s = since_us as f64 * 1e-6 / speed;
                     wait(teller, start, due_s);
                     if teller.stopped() {
                         return;
                     }
                     feed(tachometer, piece, &mut &[][..], |reading| {
-                        let laid = timeline.laid(reading);
+                        let laid = parts.timeline.laid(reading);
                         teller.tell(Told::Reading(ReadingRow::new(&laid, first_us)));
                     });
                 }
-                if recording.starts_anew() {
-                    timeline.start_anew();
-                }
-                if !more {
-                    break;
+                if set_back_us.is_some_and(|t_us| parts.set_back_to(t_us)) {
+                    tachometer.configure(settings);
                 }
             }
+            let Parts { timeline, damage, .. } = parts;
             if recording.is_shuffled() {
                 return teller.tell(Told::Refusal(SHUFFLED.to_owned()));
             }
@@ -145,7 +129,7 @@ pub fn file(mut recording: Recording, speed: f64) -> Source {
                 let (laid, first_us) = (timeline.laid(reading), first_us.unwrap_or_default());
                 teller.tell(Told::Reading(ReadingRow::new(&laid, first_us)));
             });
-            teller.tell(end);
+            teller.tell(damage.map_or(Told::End, |damage| Told::Failure(damage.to_string())));
         });
     })
 }

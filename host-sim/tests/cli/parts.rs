@@ -76,6 +76,23 @@ fn recordings_behind_each_other_have_rotors_of_their_own() {
     }
 }
 
+/// As of a recording alone: behind it another was to begin, and has no events.
+#[test]
+fn a_recording_before_one_without_events_keeps_its_last_window() {
+    let folder = folder();
+    // Measured at its end only.
+    let short: Vec<Event> = rotor().into_iter().filter(|event| event.t_us < 140_000).collect();
+    let bytes = |path| std::fs::read(path).expect("the file just written");
+    let alone = bytes(write(&folder, "alone.raw", &short));
+    let path = folder.path().join("both.raw");
+    std::fs::write(&path, [alone, bytes(write(&folder, "none.raw", &[]))].concat())
+        .expect("room on the disk");
+    let out = folder.path().join("out.png").display().to_string();
+    let run = evtach(&["screen", &path.display().to_string(), &out], b"");
+    assert!(run.stderr.contains("another recording begins at byte"), "{}", run.stderr);
+    assert!(run.stdout.contains("LOCKED"), "{}", run.stdout);
+}
+
 /// What no reading is of is told, and so is a region that holds little.
 #[test]
 fn events_in_no_window_are_told() {
