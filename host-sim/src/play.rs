@@ -16,7 +16,7 @@ const PICTURE_US: u64 = 250_000;
 pub struct Played {
     /// From the first event to the last that was played.
     pub duration_us: u64,
-    /// Whether it was played to its end.
+    /// Whether it was played to its end, or to the damage that it ends with.
     pub is_whole: bool,
     /// The damage that the recording ends with.
     pub damage: Option<RecordingError>,

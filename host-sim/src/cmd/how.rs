@@ -11,7 +11,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::span::Span;
 use super::stated::Stated;
-use super::{in_order, note, tell};
+use super::{Outcome, in_order, note, tell};
 
 /// What is known better than the tachometer finds it, and the memory it is given.
 #[derive(clap::Args)]
@@ -56,6 +56,15 @@ pub struct Measured {
     pub assumed: Vec<String>,
     pub readings: Vec<Reading>,
     pub summary: Summary,
+    /// Whether damage ended it before its end.
+    pub is_damaged: bool,
+}
+
+impl Measured {
+    /// The exit code.
+    pub fn outcome(&self) -> Outcome {
+        Outcome::of(self.is_damaged, self.summary.has_speed())
+    }
 }
 
 impl How {
@@ -91,8 +100,13 @@ impl How {
         }
         // Before what is wrong, as it may be why.
         note(&recording, &name);
+        let is_damaged = run.damage.is_some() && !run.is_past_end;
         match run.damage {
             Some(damage) if run.events_read == 0 => return Err(damage).context(name),
+            // What is damaged is not wanted.
+            Some(damage) if run.is_past_end => {
+                tell(format!("{name}: behind what is measured, {damage}"));
+            }
             Some(damage) => tell(format!("{name}: {damage}; measured what came before")),
             None if run.events_read == 0 && recording.out_of_bounds() > 0 => {
                 let Geometry { width_px, height_px } = recording.geometry;
@@ -129,7 +143,7 @@ impl How {
             tell(format!("{name}: {out_of_roi} of {} events lie outside --roi", facts.events));
         }
         let (geometry, assumed) = (recording.geometry, recording.assumed);
-        Ok(Measured { plan, facts, geometry, assumed, readings, summary })
+        Ok(Measured { plan, facts, geometry, assumed, readings, summary, is_damaged })
     }
 
     /// The tachometer's settings for a sensor of this size.

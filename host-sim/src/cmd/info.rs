@@ -13,7 +13,7 @@ use evtach_host::measure;
 use evtach_host::recording::{self, ImuSample, Recording};
 
 use super::stated::Stated;
-use super::{say, tell};
+use super::{Outcome, say, tell};
 use statistics::{Count, Statistics, Timeline};
 
 /// Arguments of `evtach info`.
@@ -39,14 +39,14 @@ const TOGETHER: f64 = 0.47;
 
 /// Runs the subcommand.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let (mut told, mut failed) = (false, false);
+    let (mut told, mut worst) = (false, Outcome::Done);
     for file in &args.files {
         if let Err(error) = about(file, &args, &mut told) {
             tell(format!("evtach: {error:#}"));
-            failed = true;
+            worst = Outcome::Failed;
         }
     }
-    Ok(ExitCode::from(if failed { 2 } else { 0 }))
+    Ok(worst.into())
 }
 
 /// Tells of one file, behind a blank line where another was told of.

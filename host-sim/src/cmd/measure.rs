@@ -1,6 +1,6 @@
 //! `evtach measure`: speed of every rotor in a recording.
 //!
-//! Exit code 0 when every file has at least one speed, 1 when one has none, 2 for bad usage or input.
+//! Exit code 0 when every file has at least one speed, 1 when one has none, 2 for bad usage or input, damaged in part, too.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use evtach_host::measure::{Document, evidence, table};
 
 use super::how::{How, Measured};
-use super::{say, tell};
+use super::{Outcome, say, tell};
 
 /// Arguments of `evtach measure`.
 #[derive(clap::Args)]
@@ -28,22 +28,20 @@ pub struct Args {
 
 /// Runs the subcommand.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
-    let (mut without, mut failed) = (false, false);
+    let mut worst = Outcome::Done;
     for file in &args.files {
-        match measure(file, &args) {
-            Ok(read) => without |= !read,
-            Err(error) => {
-                tell(format!("evtach: {error:#}"));
-                failed = true;
-            }
-        }
+        worst = worst.max(measure(file, &args).unwrap_or_else(|error| {
+            tell(format!("evtach: {error:#}"));
+            Outcome::Failed
+        }));
     }
-    Ok(ExitCode::from(if failed { 2 } else { u8::from(without) }))
+    Ok(worst.into())
 }
 
-/// Measures one file; whether it has a speed.
-fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
+/// Measures one file.
+fn measure(file: &Path, args: &Args) -> anyhow::Result<Outcome> {
     let measured = args.how.measure(file, args.verbose, |_, _| ())?;
+    let outcome = measured.outcome();
     let Measured { plan, facts, readings, summary, .. } = measured;
     if args.json {
         let document = Document::new(&plan, &facts, &summary, &readings);
@@ -54,5 +52,5 @@ fn measure(file: &Path, args: &Args) -> anyhow::Result<bool> {
     if args.verbose {
         tell(evidence(&facts, &readings).trim_end());
     }
-    Ok(summary.has_speed())
+    Ok(outcome)
 }

@@ -2,6 +2,7 @@
 
 use std::io::{ErrorKind, Write as _};
 use std::path::Path;
+use std::process::ExitCode;
 
 use anyhow::{Context as _, anyhow, bail};
 use evtach_host::recording::{Recording, SHUFFLED};
@@ -17,6 +18,33 @@ mod span;
 mod stated;
 pub mod synth;
 pub mod watch;
+
+/// How it went with a recording, and the exit code that says so: README tells them. Of several recordings the largest counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Outcome {
+    /// It was read to its end, and has a speed where one was asked for.
+    Done,
+    /// It has no speed.
+    NoSpeed,
+    /// It could not be read to the end of what was asked for: what came before the damage was used all the same.
+    Failed,
+}
+
+impl Outcome {
+    fn of(is_damaged: bool, has_speed: bool) -> Self {
+        match (is_damaged, has_speed) {
+            (true, _) => Self::Failed,
+            (false, true) => Self::Done,
+            (false, false) => Self::NoSpeed,
+        }
+    }
+}
+
+impl From<Outcome> for ExitCode {
+    fn from(outcome: Outcome) -> Self {
+        Self::from(outcome as u8)
+    }
+}
 
 /// Refuses to write over what is read, by whatever name.
 fn keep_apart(input: &Path, output: &Path) -> anyhow::Result<()> {

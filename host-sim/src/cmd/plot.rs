@@ -52,5 +52,5 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     };
     let drawn = if alone { heat_map(&subject)? } else { html(&subject)? };
     deliver(&out, drawn.as_bytes(), &out.display().to_string())?;
-    Ok(ExitCode::from(u8::from(!measured.summary.has_speed())))
+    Ok(measured.outcome().into())
 }

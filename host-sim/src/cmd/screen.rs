@@ -14,7 +14,7 @@ use evtach_host::recording;
 
 use super::span::parse_seconds;
 use super::stated::Stated;
-use super::{deliver, in_order, keep_apart, note, tell};
+use super::{Outcome, deliver, in_order, keep_apart, note, tell};
 
 /// Arguments of `evtach screen`.
 #[derive(clap::Args)]
@@ -95,7 +95,7 @@ impl Args {
     }
 }
 
-/// Runs the subcommand: 0 when the screen shows a speed, else 1.
+/// Runs the subcommand: 0 when the screen shows a speed, 1 when it shows none, 2 for bad usage or input, damaged in part, too.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     keep_apart(&args.file, &args.out)?;
     let ending = args.out.extension().map(OsStr::to_ascii_lowercase).unwrap_or_default();
@@ -111,8 +111,12 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let mut instrument = Instrument::new(args.preferences());
     let until_us = args.at.map(|seconds| (seconds * 1e6) as u64);
     let played = play(&mut recording, &mut instrument, until_us).with_context(|| name.clone())?;
-    if let Some(damage) = played.damage {
-        tell(format!("{name}: {damage}; played what came before"));
+    let is_damaged = played.damage.is_some() && played.is_whole;
+    match played.damage {
+        Some(damage) if is_damaged => tell(format!("{name}: {damage}; played what came before")),
+        // What is damaged is not wanted.
+        Some(damage) => tell(format!("{name}: behind what is played, {damage}")),
+        None => {}
     }
     if until_us.is_some() && played.is_whole {
         let end_s = played.duration_us as f64 * 1e-6;
@@ -132,5 +136,5 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     );
     let said = format!("{}: {} {shown}", args.out.display(), view.state.word());
     deliver(&args.out, &frame.png()?, &said)?;
-    Ok(ExitCode::from(u8::from(view.speed.is_none())))
+    Ok(Outcome::of(is_damaged, view.speed.is_some()).into())
 }

@@ -1,6 +1,6 @@
 //! `evtach watch`: a live view in the terminal.
 //!
-//! Exit code 0 when a speed was seen, 1 when none was, 2 for bad usage or input.
+//! Exit code 0 when a speed was seen, 1 when none was, 2 for bad usage or input, or where the source failed, whatever was seen before.
 
 use std::fs;
 use std::io::{self, IsTerminal as _};
@@ -15,7 +15,7 @@ use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 
 use super::stated::Stated;
-use super::tell;
+use super::{Outcome, tell};
 
 /// How often the view is drawn.
 const FRAME: Duration = Duration::from_millis(100);
@@ -63,12 +63,11 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     if let Some(failure) = monitor.failure() {
         tell(format!("{name}: {failure}"));
     }
-    // Where a speed was seen before, what failed then is told, but the speed stands.
-    Ok(ExitCode::from(match (monitor.seen_speed(), monitor.failure()) {
-        (true, _) => 0,
-        (false, None) => 1,
-        (false, Some(_)) => 2,
-    }))
+    Ok(outcome(&monitor).into())
+}
+
+fn outcome(monitor: &Monitor) -> Outcome {
+    Outcome::of(monitor.failure().is_some(), monitor.seen_speed())
 }
 
 /// Whether a path is a device: recordings are files.
@@ -112,4 +111,46 @@ fn asks_to_quit(key: &KeyEvent) -> bool {
     let control = key.modifiers.contains(KeyModifiers::CONTROL);
     matches!(key.code, KeyCode::Char('q') | KeyCode::Esc)
         || (control && key.code == KeyCode::Char('c'))
+}
+
+#[cfg(test)]
+mod tests {
+    use evtach_host::measure::{ReadingRow, RotorRow};
+    use evtach_host::watch::Told;
+
+    use super::*;
+
+    fn reading() -> Told {
+        let rotor = RotorRow {
+            id: "A".to_owned(),
+            x_px: 1.0,
+            y_px: 2.0,
+            radius_px: 3.0,
+            rpm: Some(1500.0),
+            rpm_sigma: Some(0.5),
+            direction: Some("cw".into()),
+            blades: None,
+            accel_rpm_per_s: None,
+            frame: Some("camera".into()),
+            status: "coarse".into(),
+            reason: None,
+        };
+        let (status, rotors) = ("coarse".into(), vec![rotor]);
+        Told::Reading(ReadingRow { t_s: 1.0, window_s: 0.1, status, reason: None, rotors })
+    }
+
+    #[test]
+    fn what_fails_is_told_by_the_exit_code_whatever_was_seen_before() {
+        let failure = || Told::Failure("line 7".to_owned());
+        for (told, expected) in [
+            (vec![reading(), Told::End], Outcome::Done),
+            (vec![Told::End], Outcome::NoSpeed),
+            (vec![failure()], Outcome::Failed),
+            (vec![reading(), failure()], Outcome::Failed),
+        ] {
+            let mut monitor = Monitor::new(String::new());
+            told.into_iter().for_each(|told| monitor.take(told, Duration::ZERO));
+            assert_eq!(outcome(&monitor), expected);
+        }
+    }
 }

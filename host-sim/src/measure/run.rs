@@ -40,6 +40,8 @@ pub struct Run {
     pub timeline: Timeline,
     /// The damage that the file ends with; what came before it is measured.
     pub damage: Option<RecordingError>,
+    /// Whether the last event lies behind the part that was to be measured.
+    pub is_past_end: bool,
 }
 
 impl Run {
@@ -58,7 +60,7 @@ impl Run {
             ..FileFacts::default()
         };
         let mut readings = Vec::new();
-        let mut has_gyro = false;
+        let (mut has_gyro, mut is_past_end) = (false, false);
         let mut parts = Parts::of(recording, plan.capacity);
         let ignored = with_tachometer(plan.settings, plan.capacity, |tachometer| {
             let since_us = plan.since_us.clone();
@@ -68,6 +70,7 @@ impl Run {
                 origin_us: None,
                 is_inside: plan.since_us.start == 0,
                 starts_anew: true,
+                is_past_end: false,
                 facts: &mut facts,
                 seen,
             };
@@ -130,11 +133,12 @@ impl Run {
                 }
             }
             chosen.facts.thinned = tachometer.thinned();
+            is_past_end = chosen.is_past_end;
             tachometer.ignored()
         });
         let Parts { timeline, events_read, damage, .. } = parts;
         facts.lost += ignored.out_of_order;
-        Self { facts, readings, events_read, ignored, has_gyro, timeline, damage }
+        Self { facts, readings, events_read, ignored, has_gyro, timeline, damage, is_past_end }
     }
 }
 
@@ -149,6 +153,8 @@ struct Chosen<'a, S> {
     is_inside: bool,
     /// Whether no event of the recording at hand was of the part.
     starts_anew: bool,
+    /// Whether the last event so far lies behind the part.
+    is_past_end: bool,
     facts: &'a mut FileFacts,
     seen: S,
 }
@@ -160,7 +166,9 @@ impl<S: FnMut(&[Event], &Timeline)> Chosen<'_, S> {
         self.facts.origin_us = *self.origin_us.get_or_insert(first.t_us);
         if self.since_us != (0..u64::MAX) {
             events.retain(|event| {
-                self.is_inside = self.since_us.contains(&self.since.of(event));
+                let since_us = self.since.of(event);
+                self.is_inside = self.since_us.contains(&since_us);
+                self.is_past_end = since_us >= self.since_us.end;
                 self.is_inside
             });
         }

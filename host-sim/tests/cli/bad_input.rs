@@ -90,6 +90,39 @@ fn truncated_file() {
     }
 }
 
+/// Every subcommand uses what comes before the damage, tells its place, and says by its exit code that there is some.
+#[test]
+fn damage_in_the_midst() {
+    let folder = folder();
+    let path = csv(&folder, "damaged.csv", HEAD, &rotor());
+    let text = std::fs::read_to_string(&path).expect("the file just written");
+    let mut lines: Vec<&str> = text.lines().collect();
+    let place = lines.len() * 9 / 10;
+    lines[place] = "oops,1,2,1";
+    std::fs::write(&path, lines.join("\n")).expect("room on the disk");
+    let place = format!("CSV, line {}: the time is \"oops\"", place + 1);
+    let path = path.display().to_string();
+    let picture = folder.path().join("out.png").display().to_string();
+    for (command, part, told) in [
+        (&["measure", &path][..], &["--end", "0.12"][..], " rpm cw "),
+        (&["measure", "--json", &path], &["--end", "0.12"], "\"status\":\"locked\""),
+        (&["plot", &path, "--out", "-"], &["--end", "0.12"], "</html>"),
+        (&["screen", &path, &picture], &["--at", "0.12"], "LOCKED"),
+        (&["convert", &path, "-", "--to", "csv"], &["--end", "0.12"], "t,x,y,p"),
+        (&["info", &path], &[], "out of order    0"),
+    ] {
+        let run = evtach(command, b"");
+        assert_eq!(run.code, Some(2), "{command:?}: {}", run.stderr);
+        assert!(run.stderr.contains(&place), "{command:?}: {}", run.stderr);
+        assert!(run.stdout.contains(told), "{command:?}: {}", run.stdout);
+        if !part.is_empty() {
+            // What is damaged is not wanted.
+            let run = evtach(&[command, part].concat(), b"");
+            assert!(run.code < Some(2), "{command:?}: {}", run.stderr);
+        }
+    }
+}
+
 /// Cut within its header there is nothing to measure.
 #[test]
 fn truncated_header() {
