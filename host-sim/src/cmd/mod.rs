@@ -80,20 +80,8 @@ fn same_file(one: &Path, other: &Path) -> anyhow::Error {
 
 /// Says what is to be known of a recording once it is read.
 fn note(recording: &Recording, name: &str) {
-    for note in &recording.side().notes {
+    for note in recording.notes() {
         tell(format!("{name}: {note}"));
-    }
-    if recording.side().unknown > 0 {
-        tell(format!(
-            "{name}: {} words of unknown type left out; many mean damage, or another format or byte order",
-            recording.side().unknown
-        ));
-    }
-    if recording.out_of_bounds() > 0 {
-        tell(format!(
-            "{name}: {} events outside the sensor left out; state its size with --geometry WxH if it is wrong",
-            recording.out_of_bounds()
-        ));
     }
 }
 

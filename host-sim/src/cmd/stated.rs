@@ -14,6 +14,13 @@ pub struct Stated {
     time_unit: Option<TimeUnit>,
 }
 
+impl Stated {
+    /// Its options, and whether each was stated.
+    pub const fn which(self) -> [(&'static str, bool); 2] {
+        [("--geometry", self.geometry.is_some()), ("--time-unit", self.time_unit.is_some())]
+    }
+}
+
 impl From<Stated> for OpenOptions {
     fn from(stated: Stated) -> Self {
         Self { geometry: stated.geometry, time_unit: stated.time_unit }

@@ -19,6 +19,8 @@ use super::{Outcome, tell};
 
 /// How often the view is drawn.
 const FRAME: Duration = Duration::from_millis(100);
+/// Speed of a serial port unless stated, in bits a second.
+const BAUD: u32 = 115_200;
 
 /// Arguments of `evtach watch`.
 #[derive(clap::Args)]
@@ -26,12 +28,12 @@ pub struct Args {
     /// A recording, or the serial port of a device.
     #[arg(value_name = "FILE|PORT")]
     from: PathBuf,
-    /// How many times as fast as it was recorded a recording plays.
-    #[arg(long, value_name = "TIMES", default_value_t = 1.0, value_parser = parse_speed)]
-    speed: f64,
-    /// Speed of the serial port in bits a second; ports over USB ignore it.
-    #[arg(long, default_value_t = 115_200)]
-    baud: u32,
+    /// How many times as fast as it was recorded a recording plays [default: 1].
+    #[arg(long, value_name = "TIMES", value_parser = parse_speed)]
+    speed: Option<f64>,
+    /// Speed of the serial port in bits a second, which ports over USB ignore [default: 115200].
+    #[arg(long)]
+    baud: Option<u32>,
     #[command(flatten)]
     stated: Stated,
 }
@@ -43,22 +45,48 @@ fn parse_speed(text: &str) -> Result<f64, String> {
     }
 }
 
+impl Args {
+    /// Refuses what would do nothing: whoever states it takes the one source for the other.
+    fn check(&self) -> anyhow::Result<()> {
+        let (what, idle) = if is_port(&self.from) {
+            let of_file = [("--speed", self.speed.is_some())];
+            ("a port", of_file.into_iter().chain(self.stated.which()).collect())
+        } else {
+            ("a recording", vec![("--baud", self.baud.is_some())])
+        };
+        if let Some((option, _)) = idle.iter().find(|(_, is_stated)| *is_stated) {
+            let from = self.from.display();
+            bail!("{from} is {what}: {option} does nothing there\nhelp: leave out {option}");
+        }
+        Ok(())
+    }
+}
+
 /// Runs the subcommand.
 pub fn run(args: Args) -> anyhow::Result<ExitCode> {
+    args.check()?;
     if !io::stdout().is_terminal() {
         bail!("watch draws on a terminal; for a pipe use `evtach measure --json`");
     }
     let name = args.from.display().to_string();
     let source = if is_port(&args.from) {
-        port(&args.from, args.baud)?
+        port(&args.from, args.baud.unwrap_or(BAUD))?
     } else {
         let options = args.stated.into();
-        file(recording::open(&args.from, &options).with_context(|| name.clone())?, args.speed)
+        let recording = recording::open(&args.from, &options).with_context(|| name.clone())?;
+        // The view covers it, and leaves it where it was when it is closed.
+        for assumed in &recording.assumed {
+            tell(format!("{name}: {assumed}"));
+        }
+        file(recording, args.speed.unwrap_or(1.0))
     };
     let mut monitor = Monitor::new(name.clone());
     let shown = show(ratatui::init(), &source, &mut monitor);
     ratatui::restore();
     shown.context("the terminal failed")?;
+    for remark in monitor.remarks() {
+        tell(format!("{name}: {remark}"));
+    }
     // The view had room for its first words.
     if let Some(failure) = monitor.failure() {
         tell(format!("{name}: {failure}"));

@@ -248,6 +248,25 @@ impl Recording {
         &self.side
     }
 
+    /// What a person should know of it once it is read, one sentence each.
+    #[must_use]
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = self.side.notes.clone();
+        if self.side.unknown > 0 {
+            notes.push(format!(
+                "{} words of unknown type left out; many mean damage, or another format or byte order",
+                self.side.unknown
+            ));
+        }
+        if self.out_of_bounds > 0 {
+            notes.push(format!(
+                "{} events outside the sensor left out; state its size with --geometry WxH if it is wrong",
+                self.out_of_bounds
+            ));
+        }
+        notes
+    }
+
     /// Bytes of the file read so far, for a progress bar (not counted inside .npz).
     #[must_use]
     pub fn bytes_read(&self) -> u64 {

@@ -18,8 +18,10 @@ const GONE: Duration = Duration::from_secs(4);
 pub enum Told {
     /// A reading.
     Reading(ReadingRow),
-    /// Something about the source, for the person.
+    /// Something about the source, for the person, as long as nothing else is told.
     Note(String),
+    /// What is to be known of a recording once it is played: there is no room for it in the view.
+    Remark(String),
     /// There is nothing more to come.
     End,
     /// There is nothing more to come, and why: something failed.
@@ -35,6 +37,7 @@ pub struct Monitor {
     readings: VecDeque<ReadingRow>,
     last: Duration,
     note: String,
+    remarks: Vec<String>,
     ended: bool,
     failure: Option<String>,
     chosen: usize,
@@ -50,6 +53,7 @@ impl Monitor {
             readings: VecDeque::new(),
             last: Duration::ZERO,
             note: "waiting for the first reading".to_owned(),
+            remarks: Vec::new(),
             ended: false,
             failure: None,
             chosen: 0,
@@ -74,6 +78,7 @@ impl Monitor {
                 self.note.clear();
             }
             Told::Note(note) => self.note = note,
+            Told::Remark(remark) => self.remarks.push(remark),
             Told::End => {
                 "the recording has ended".clone_into(&mut self.note);
                 self.ended = true;
@@ -107,6 +112,12 @@ impl Monitor {
     #[must_use]
     pub fn note(&self) -> &str {
         &self.note
+    }
+
+    /// What is to be known of a recording, for when the view is left.
+    #[must_use]
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
     }
 
     /// What failed, in full.

@@ -121,6 +121,13 @@ pub fn file(mut recording: Recording, speed: f64) -> Source {
                 }
             }
             let Parts { timeline, damage, .. } = parts;
+            let set_back = timeline.is_set_back().then(|| timeline.note());
+            let ignored = tachometer.ignored().out_of_order;
+            let stepped = (ignored > 0)
+                .then(|| format!("{ignored} events stepped back in time and were left out"));
+            for remark in recording.notes().into_iter().chain(stepped).chain(set_back) {
+                teller.tell(Told::Remark(remark));
+            }
             if recording.is_shuffled() {
                 return teller.tell(Told::Refusal(SHUFFLED.to_owned()));
             }
@@ -301,6 +308,26 @@ mod tests {
         let source = file(recording::open(&path, &OpenOptions::default())?, 1e6);
         let told: Vec<Told> = source.told.iter().collect();
         assert_eq!(told, [Told::Refusal(SHUFFLED.to_owned())]);
+        Ok(())
+    }
+
+    #[test]
+    fn what_is_to_be_known_of_a_recording_is_told_before_its_end() -> Result<(), RecordingError> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("wild.csv");
+        // Outside the sensor; by a clock that is set back.
+        let first: String = (0..20).map(|i| format!("50000{i:02},1,2,1\n")).collect();
+        let text = format!("%geometry:64,48\nt,x,y,p\n{first}5000020,99,2,1\n7,1,2,0\n");
+        std::fs::write(&path, text).expect("room on the disk");
+        let source = file(recording::open(&path, &OpenOptions::default())?, 1e6);
+        let told: Vec<Told> = source.told.iter().collect();
+        let remarks = told.iter().filter_map(|told| match told {
+            Told::Remark(remark) => Some(remark.split_whitespace().take(4).collect::<Vec<_>>()),
+            _ => None,
+        });
+        let expected = [["1", "events", "outside", "the"], ["behind", "event", "20", "the"]];
+        assert_eq!(remarks.collect::<Vec<_>>(), expected);
+        assert_eq!(told.last(), Some(&Told::End));
         Ok(())
     }
 

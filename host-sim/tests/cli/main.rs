@@ -9,6 +9,7 @@ mod gyro;
 mod parts;
 mod screen;
 mod usage;
+mod watch;
 
 use std::path::{Path, PathBuf};
 
