@@ -16,7 +16,8 @@ use super::{deliver, keep_apart};
 pub struct Args {
     /// Recording; "-" reads stdin.
     file: PathBuf,
-    /// Report to write [default: the recording's name with .html], "-" for stdout; a name in .svg gets the heat map alone.
+    /// Report to write, "-" for stdout; a name in .svg gets the heat map alone [default: the recording's name with .html, which must
+    /// not be there yet].
     #[arg(short, long, value_name = "HTML|SVG")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -31,6 +32,13 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         None => args.file.with_extension("html"),
     };
     keep_apart(&args.file, &out)?;
+    // What was named is written over, as by the other subcommands. This was not.
+    if args.out.is_none() && out.symlink_metadata().is_ok() {
+        let out = out.display();
+        bail!(
+            "{out} is there already\nhelp: say --out {out} to write over it, or choose another name"
+        );
+    }
     let ending = out.extension().map(OsStr::to_ascii_lowercase).unwrap_or_default();
     let alone = match ending.to_str() {
         Some("" | "html" | "htm") => false,

@@ -22,6 +22,24 @@ fn a_truth_is_not_written_over_its_recording() {
     }
 }
 
+/// What was named is written over, by every subcommand; what was not is left as it is.
+#[test]
+fn a_report_that_nobody_named_is_not_written_over() {
+    let folder = folder();
+    let file = write(&folder, "rotor.raw", &rotor()).display().to_string();
+    let report = folder.path().join("rotor.html");
+    let name = report.display().to_string();
+    let run = evtach(&["plot", &file], b"");
+    assert_eq!((run.code, run.stdout), (Some(0), format!("{name}\n")), "{}", run.stderr);
+    std::fs::write(&report, b"what was there").expect("room on the disk");
+    assert_refused_as_bad(&evtach(&["plot", &file], b""), &format!("{name} is there already"));
+    assert_eq!(std::fs::read(&report).ok().as_deref(), Some(&b"what was there"[..]));
+    let run = evtach(&["plot", &file, "--out", &name], b"");
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let written = std::fs::read_to_string(&report).expect("a report");
+    assert!(written.contains("</html>"), "{written}");
+}
+
 #[test]
 fn a_part_that_ends_before_it_starts_is_refused() {
     let folder = folder();
