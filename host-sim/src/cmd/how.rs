@@ -131,6 +131,9 @@ impl How {
                 "{name}: {overrun} events are in no window: they came right before a break in the stream or a window that began anew"
             ));
         }
+        if let Some(wrong) = run.timeline.wrong_times() {
+            tell(format!("{name}: {wrong}"));
+        }
         if run.timeline.is_set_back() {
             let set_back = run.timeline.note();
             tell(format!("{name}: {set_back}; what follows is measured as if it came then"));

@@ -75,6 +75,9 @@ fn about(file: &Path, args: &Args, told: &mut bool) -> anyhow::Result<()> {
     let mut text = if *told { "\n".to_owned() } else { String::new() };
     // Writing into a string does not fail.
     let _ = report(&mut text, &name, &recording, &statistics, &imu);
+    if let Some(wrong) = timeline.wrong_times() {
+        let _ = writeln!(text, "note            {wrong}");
+    }
     if timeline.is_set_back() {
         let _ =
             writeln!(text, "note            {}; its parts are laid end to end", timeline.note());

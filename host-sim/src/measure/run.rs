@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
-use evtach_core::{Event, GyroSample, Ignored, Reading, Settings};
+use evtach_core::{CLOCK_RESET_US, Event, GyroSample, Ignored, Reading, Settings};
 
 use super::letters::Letters;
+use super::mean::window_us;
 use super::pause::Pauses;
 use super::wait::Wait;
 use super::{Capacity, FileFacts, Parts, Since, Timeline, drain, feed, with_tachometer};
@@ -128,6 +129,11 @@ impl Run {
                     if parts.set_back_to(t_us) {
                         tachometer.configure(plan.settings);
                     }
+                    // A window that reaches as far ahead holds wrong times: it was at none that could be told.
+                    let ahead_us = parts.timeline.at(t_us).saturating_add(CLOCK_RESET_US);
+                    let told =
+                        readings.iter().rposition(|reading| window_us(reading).end < ahead_us);
+                    readings.truncate(told.map_or(0, |last| last + 1));
                     (wait, rolled_us) = (Wait::default(), 0);
                     pauses = Pauses::within(plan.settings.roi);
                 }
@@ -145,7 +151,7 @@ impl Run {
 /// The part of a recording that is to be measured.
 struct Chosen<'a, S> {
     since_us: Range<u64>,
-    /// Not the timeline: behind a wrong time far ahead, that lays what follows as far ahead.
+    /// Not the timeline: it takes fewer times that are far ahead for wrong ones.
     since: Since,
     /// The first event of all.
     origin_us: Option<u64>,

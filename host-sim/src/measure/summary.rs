@@ -147,7 +147,7 @@ impl<'a> OneWay<'a> {
         let way = |rotor: &RotorReading| rotor.speed.map(|speed| speed.direction());
         let lasts_us = |stretch: &&[(&Reading, _)]| {
             let ends = stretch.first().zip(stretch.last());
-            ends.map(|(first, last)| window_us(last.0).end - window_us(first.0).start)
+            ends.map(|(first, last)| window_us(last.0).end.saturating_sub(window_us(first.0).start))
         };
         let stretches = locked.chunk_by(|a, b| way(a.1) == way(b.1));
         let longest = stretches.max_by_key(lasts_us).unwrap_or_default();

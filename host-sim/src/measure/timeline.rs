@@ -16,6 +16,30 @@ pub struct Timeline {
     first: Option<(u64, u64)>,
     events: u64,
     set_back: u64,
+    /// The clock leapt ahead, and may yet come back.
+    leap: Option<Leap>,
+    /// Where the first wrong time was, and by how much; and how many there were.
+    first_wrong: Option<(u64, u64)>,
+    wrong: u64,
+}
+
+/// Where the clock leaps ahead: a pause, or a time that is wrong.
+#[derive(Clone, Copy, Debug)]
+struct Leap {
+    /// Latest time of the clock before it.
+    before_us: u64,
+    /// Events since.
+    events: u64,
+}
+
+impl Leap {
+    /// So many events, and no more, are wrong times where the clock then goes on from where it was: fewer than any speed is measured of.
+    const MOST_WRONG: u64 = 100;
+
+    /// Whether the clock goes on from where it was.
+    const fn was_wrong(&self, t_us: u64) -> bool {
+        self.before_us.abs_diff(t_us) < CLOCK_RESET_US
+    }
 }
 
 impl Timeline {
@@ -26,22 +50,28 @@ impl Timeline {
         }
         // Where nothing came before, there is no border.
         self.starts_anew &= events.is_empty();
-        let mut latest_us = self.latest_us.unwrap_or(0);
-        let goes_back = |event: &Event| {
-            let goes_back = latest_us.saturating_sub(event.t_us) >= CLOCK_RESET_US;
-            latest_us = latest_us.max(event.t_us);
-            goes_back
-        };
-        let part = events.iter().position(goes_back).unwrap_or(events.len());
-        let latest_us = events[..part].iter().map(|event| event.t_us).max();
-        self.latest_us = self.latest_us.max(latest_us);
-        self.events += part as u64;
-        part
+        for (at, event) in events.iter().enumerate() {
+            let latest_us = self.latest_us.unwrap_or(event.t_us);
+            if latest_us.saturating_sub(event.t_us) >= CLOCK_RESET_US {
+                return at;
+            }
+            if event.t_us.saturating_sub(latest_us) >= CLOCK_RESET_US {
+                self.leap.get_or_insert(Leap { before_us: latest_us, events: 0 });
+            }
+            if let Some(leap) = &mut self.leap {
+                leap.events += 1;
+                self.leap = self.leap.filter(|leap| leap.events <= Leap::MOST_WRONG);
+            }
+            self.latest_us = Some(latest_us.max(event.t_us));
+            self.events += 1;
+        }
+        events.len()
     }
 
     /// Says that what comes next is another recording, which is a part of its own however near its clock is.
     pub const fn start_anew(&mut self) {
         self.starts_anew = true;
+        self.leap = None;
     }
 
     /// Whether what comes next is another recording.
@@ -50,10 +80,18 @@ impl Timeline {
         self.starts_anew
     }
 
-    /// Begins the next part: the clock was set back to the time of its first event. Tells whether by so little that the tachometer,
-    /// which is told of it by the times alone, would take it for disorder.
+    /// Begins the next part: the clock was set back to the time of its first event, or comes back to where it was before a few wrong
+    /// times, from where it then goes on. Tells whether by so little that the tachometer, which is told of it by the times alone, would
+    /// take it for disorder.
     pub fn set_back_to(&mut self, t_us: u64) -> bool {
         self.starts_anew = false;
+        if let Some(leap) = self.leap.take().filter(|leap| leap.was_wrong(t_us)) {
+            let ahead_us = self.latest_us.unwrap_or(t_us).saturating_sub(leap.before_us);
+            self.first_wrong.get_or_insert((self.events - leap.events, ahead_us));
+            self.wrong += leap.events;
+            self.latest_us = Some(leap.before_us);
+            return false;
+        }
         let by_us = self.latest_us.unwrap_or(t_us).saturating_sub(t_us);
         self.shift_us = self.shift_us.saturating_add(by_us);
         self.latest_us = Some(t_us);
@@ -121,6 +159,16 @@ impl Timeline {
         self.set_back > 0
     }
 
+    /// Which times were wrong, where some were.
+    #[must_use]
+    pub fn wrong_times(&self) -> Option<String> {
+        let (before, ahead_us) = self.first_wrong?;
+        let (wrong, ahead_s) = (self.wrong, ahead_us as f64 * 1e-6);
+        Some(format!(
+            "{wrong} events have a wrong time, far ahead of the rest, the first behind event {before} by {ahead_s:.3} s; the rest goes on from where it was"
+        ))
+    }
+
     /// Where the clock was set back, and how often.
     #[must_use]
     pub fn note(&self) -> String {
@@ -161,6 +209,49 @@ mod tests {
             }
             assert_eq!(laid, laid_us, "{at_once}");
             assert_eq!((timeline.first, timeline.set_back), (Some((3, S)), 2));
+        }
+    }
+
+    #[test]
+    fn what_comes_behind_a_wrong_time_goes_on_from_where_it_was() {
+        const S: u64 = 1_000_000;
+        let event = |t_us| Event { t_us, x: 0, y: 0, polarity: Polarity::On };
+        let right: Vec<Event> = (0..1000).map(|i| event(S + i)).collect();
+        for (wrong, is_wrong) in
+            [(1, true), (Leap::MOST_WRONG, true), (1 + Leap::MOST_WRONG, false)]
+        {
+            let ahead = (0..wrong).map(|i| event(9000 * S + i));
+            let events: Vec<Event> = right[..500]
+                .iter()
+                .copied()
+                .chain(ahead)
+                .chain(right[500..].iter().copied())
+                .collect();
+            for at_once in [1, 7, 2000] {
+                let (mut timeline, mut laid) = (Timeline::default(), Vec::new());
+                events.chunks(at_once).for_each(|piece| timeline.lay(piece, |e| laid.push(*e)));
+                assert_eq!((laid.len(), timeline.is_set_back()), (events.len(), !is_wrong));
+                assert_eq!(
+                    laid[laid.len() - 500..] == right[500..],
+                    is_wrong,
+                    "{wrong}, {at_once}"
+                );
+                let told = format!(
+                    "{wrong} events have a wrong time, far ahead of the rest, the first behind event 500 by 8999.000 s"
+                );
+                let note = timeline.wrong_times();
+                assert_eq!(note.is_some_and(|note| note.starts_with(&told[..60])), is_wrong);
+            }
+        }
+        // A pause that ends with the clock set back is none, nor is the clock of another recording.
+        for (last_us, starts_anew) in [(7 * S, false), (S, true)] {
+            let mut timeline = Timeline::default();
+            timeline.lay(&[event(S), event(9 * S)], |_| ());
+            if starts_anew {
+                timeline.start_anew();
+            }
+            timeline.lay(&[event(last_us)], |laid| assert_eq!(laid.t_us, 9 * S));
+            assert!(timeline.is_set_back());
         }
     }
 

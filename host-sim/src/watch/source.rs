@@ -125,7 +125,13 @@ pub fn file(mut recording: Recording, speed: f64) -> Source {
             let ignored = tachometer.ignored().out_of_order;
             let stepped = (ignored > 0)
                 .then(|| format!("{ignored} events stepped back in time and were left out"));
-            for remark in recording.notes().into_iter().chain(stepped).chain(set_back) {
+            for remark in recording
+                .notes()
+                .into_iter()
+                .chain(stepped)
+                .chain(timeline.wrong_times())
+                .chain(set_back)
+            {
                 teller.tell(Told::Remark(remark));
             }
             if recording.is_shuffled() {

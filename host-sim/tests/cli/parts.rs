@@ -2,6 +2,7 @@
 
 use evtach_core::{Event, Polarity};
 use evtach_host::synth::{Rotor, Scene, generate};
+use serde_json::Value;
 
 use super::{SIDES_PX, evtach, folder, measure, rotor, write};
 
@@ -73,6 +74,37 @@ fn recordings_behind_each_other_have_rotors_of_their_own() {
             rows.iter().all(|row| row.contains(" from ") && !row.contains("rpm/s")),
             "{rows:?}"
         );
+    }
+}
+
+/// What comes behind a wrong time is measured at its own, and the wrong one is told.
+#[test]
+fn a_wrong_time_is_no_time_of_what_follows() {
+    let folder = folder();
+    let mut events = turning(2400.0, 400.0);
+    let at = events.len() / 3;
+    for (ahead_us, options) in [
+        (10_000_000_000, &[][..]),
+        (10_000_000_000, &["--capacity", "device"]),
+        (1_500_000, &[]),
+        (1_500_000, &["--capacity", "device"]),
+    ] {
+        let right_us = events[at].t_us;
+        events[at].t_us += ahead_us;
+        let path = write(&folder, "wrong.npy", &events).display().to_string();
+        events[at].t_us = right_us;
+        let command = ["measure", "--geometry", "200x160", "--json", &path];
+        let run = evtach(&[&command, options].concat(), b"");
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        assert!(run.stderr.contains("1 events have a wrong time"), "{}", run.stderr);
+        assert!(!run.stderr.contains("set back"), "{}", run.stderr);
+        let document: Value = serde_json::from_str(&run.stdout).expect("a document");
+        let number = |value: &Value| value.as_f64().expect("a number");
+        assert!((number(&document["duration_s"]) - 0.4).abs() < 1e-3, "{document}");
+        let readings = document["readings"].as_array().expect("a list");
+        let times: Vec<f64> = readings.iter().map(|reading| number(&reading["t_s"])).collect();
+        assert!(times.len() >= 2 && times.is_sorted() && times[times.len() - 1] < 0.4, "{times:?}");
+        assert!((number(&document["rotors"][0]["rpm"]) / 2400.0 - 1.0).abs() < 1e-3, "{document}");
     }
 }
 
