@@ -1,12 +1,14 @@
 //! `evtach plot`: a report with pictures, as one HTML file.
 
 use std::ffi::OsStr;
+use std::fs::File;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::bail;
 use evtach_core::Event;
-use evtach_host::report::{Subject, heat_map, html};
+use evtach_host::report::{Subject, heat_map, html, is_report};
 
 use super::how::How;
 use super::{deliver, keep_apart};
@@ -16,8 +18,8 @@ use super::{deliver, keep_apart};
 pub struct Args {
     /// Recording; "-" reads stdin.
     file: PathBuf,
-    /// Report to write, "-" for stdout; a name in .svg gets the heat map alone [default: the recording's name with .html, which must
-    /// not be there yet].
+    /// Report to write, "-" for stdout; a name in .svg gets the heat map alone [default: the recording's name with .html, unless
+    /// something else than a report is there].
     #[arg(short, long, value_name = "HTML|SVG")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -32,8 +34,8 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         None => args.file.with_extension("html"),
     };
     keep_apart(&args.file, &out)?;
-    // What was named is written over, as by the other subcommands. This was not.
-    if args.out.is_none() && out.symlink_metadata().is_ok() {
+    // What was named is written over, as by the other subcommands. This was not, but an older report is what it renews.
+    if args.out.is_none() && !is_free(&out) {
         let out = out.display();
         bail!(
             "{out} is there already\nhelp: say --out {out} to write over it, or choose another name"
@@ -61,4 +63,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
     let drawn = if alone { heat_map(&subject)? } else { html(&subject)? };
     deliver(&out, drawn.as_bytes(), &out.display().to_string())?;
     Ok(measured.outcome().into())
+}
+
+/// Whether nothing is there, or an older report.
+fn is_free(path: &Path) -> bool {
+    let mut start = Vec::new();
+    match File::open(path) {
+        Ok(file) => file.take(256).read_to_end(&mut start).is_ok() && is_report(&start),
+        // A link to nowhere is something.
+        Err(_) => path.symlink_metadata().is_err(),
+    }
 }

@@ -47,6 +47,9 @@ pub struct Subject<'a> {
     pub assumed: &'a [String],
 }
 
+/// What a report begins with, and nothing else does.
+const HEAD: &str = "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"generator\" content=\"evtach\">";
+
 /// One colour a rotor, distinct in print and for most colour-blind readers (Okabe and Ito).
 const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
@@ -103,9 +106,15 @@ pub fn html(subject: &Subject<'_>) -> Result<String, ReportError> {
     let stages = evidence(subject.facts, subject.readings);
     body += &format!("<h2>What each stage found</h2>\n<pre>{}</pre>\n", escaped(&stages));
     Ok(format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title>\n<style>{STYLE}</style>\
+        "{HEAD}<title>{title}</title>\n<style>{STYLE}</style>\
          </head><body>\n{body}</body></html>\n"
     ))
+}
+
+/// Whether a file that begins so is a report of ours, of whatever version.
+#[must_use]
+pub fn is_report(start: &[u8]) -> bool {
+    start.starts_with(HEAD.as_bytes())
 }
 
 /// Draws the heat map with its rotors alone, as one SVG document.

@@ -22,7 +22,7 @@ fn a_truth_is_not_written_over_its_recording() {
     }
 }
 
-/// What was named is written over, by every subcommand; what was not is left as it is.
+/// What was named is written over, by every subcommand; what was not is left as it is, but an older report is renewed.
 #[test]
 fn a_report_that_nobody_named_is_not_written_over() {
     let folder = folder();
@@ -31,6 +31,7 @@ fn a_report_that_nobody_named_is_not_written_over() {
     let name = report.display().to_string();
     let run = evtach(&["plot", &file], b"");
     assert_eq!((run.code, run.stdout), (Some(0), format!("{name}\n")), "{}", run.stderr);
+    assert_eq!(evtach(&["plot", &file], b"").code, Some(0));
     std::fs::write(&report, b"what was there").expect("room on the disk");
     assert_refused_as_bad(&evtach(&["plot", &file], b""), &format!("{name} is there already"));
     assert_eq!(std::fs::read(&report).ok().as_deref(), Some(&b"what was there"[..]));
