@@ -16,7 +16,7 @@ mod work;
 use heapless::Vec;
 
 use crate::limits::{MAX_ROTORS, MAX_SUSPECTS, POLAR_EVENTS};
-use crate::rotors::extraction::{Extraction, InStep, Round};
+use crate::rotors::extraction::{Extraction, Round};
 use crate::rotors::{Found, HeatMap, Spectrum};
 use crate::settings::{Ignored, Memory, More, Settings};
 use crate::speed::measurement::{Measurement, Outcome};
@@ -86,7 +86,10 @@ pub struct Tachometer<'m> {
     scratch: &'m mut Scratch,
     candidates: Vec<Suspect, MAX_SUSPECTS>,
     outcomes: Vec<Outcome, MAX_ROTORS>,
-    in_step: Option<InStep>,
+    /// Whether what keeps step in this window passes more often than is followed.
+    too_fast: bool,
+    /// Frequency in Hz at which all that is seen flickers, 0 for none.
+    lamp_hz: f32,
     /// Whether a rotor that is followed was not locked in this window.
     lost: bool,
     /// Whether polarity is ignored in what is searched and found, as the window showed nothing sure with it.
@@ -157,7 +160,8 @@ impl<'m> Tachometer<'m> {
             scratch,
             candidates: Vec::new(),
             outcomes: Vec::new(),
-            in_step: None,
+            too_fast: false,
+            lamp_hz: 0.0,
             lost: false,
             ignores_polarity: false,
             tracker: Tracker::default(),

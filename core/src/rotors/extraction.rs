@@ -203,17 +203,14 @@ pub struct Extraction {
     swept: Option<Disc>,
     /// Rotors by every line: the same one may stand here twice.
     candidates: Vec<Candidate, MAX_CANDIDATES>,
-    in_step: Option<InStep>,
+    /// Whether what keeps step passes more often than blades are followed.
+    too_fast: bool,
+    /// Frequency in Hz of the strongest line that all that is seen keeps step with at once, as under a lamp; 0 for none.
+    lamp_hz: f32,
 }
 
-/// What keeps step with a frequency, and is no rotor that can be measured.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum InStep {
-    /// All that is seen at once, at this frequency in Hz: a lamp.
-    AllOver(f32),
-    /// Blades that pass more often than they are followed.
-    TooFast,
-}
+/// What flickers more slowly than this in Hz, all of it, is no lamp, but before a camera that moves.
+const LEAST_LAMP_HZ: f32 = 90.0;
 
 /// Memory that an extraction works in.
 #[derive(Debug, Default)]
@@ -305,10 +302,16 @@ impl Extraction {
         &self.candidates
     }
 
-    /// What keeps step beside them, by the strongest line of such.
+    /// Whether blades pass more often than they are followed.
     #[must_use]
-    pub const fn in_step(&self) -> Option<InStep> {
-        self.in_step
+    pub const fn too_fast(&self) -> bool {
+        self.too_fast
+    }
+
+    /// Frequency in Hz at which all that is seen flickers, as a lamp makes it; 0 for none.
+    #[must_use]
+    pub const fn lamp_hz(&self) -> f32 {
+        self.lamp_hz
     }
 
     // Not inlined: flash is short.

@@ -5,7 +5,7 @@
 //! The looks of a row have a shortest distance; times of their own come as close to each other as chance brings them. A link or a lamp
 //! that lets through bursts folds as well, and even less is known of what passes in between.
 
-use crate::math::floor;
+use crate::math::round;
 use crate::rotors::Disc;
 use crate::store::Window;
 
@@ -21,15 +21,15 @@ const BEYOND_CHANCE: f32 = 5.0;
 const MOST_SOONER: u32 = LINES as u32 / 4;
 
 /// Times that hold an event or none, of which bursts fill less than half.
-const SLOT_US: u32 = 200;
+const SLOT_US: u32 = 256;
 /// Fewest bursts that are told to be regular.
 const LEAST_BURSTS: u32 = 8;
 /// Sensors come round sooner.
 const SCAN_US: f32 = 1000.0;
 /// What a look finds is stamped with one time; what is let through takes longer than this.
 const STAMPED_US: f32 = 20.0;
-/// What a rotor's own bursts and its turns may be apart by, over all of them.
-const OWN_TURNS: f32 = 0.1;
+/// What a rotor's own bursts and its passes may be apart by, over all of them, in halves of a pass.
+const OWN_HALVES: f32 = 0.2;
 
 /// The looks at one row or column.
 #[derive(Clone, Copy)]
@@ -71,30 +71,43 @@ pub fn looks_seldom(window: &Window<'_>, disc: Disc, most_us: f32) -> bool {
     [&columns[..], &rows, &all].iter().any(|lines| is_regular(lines, window, most_us))
 }
 
-/// Whether events come in bursts, as regular as a clock's, that the rotor does not make: its own come once or twice a turn or a pass. A sensor that
+/// Whether events come in bursts, as regular as a clock's, that the rotor does not make, half of whose passes take `most_us`: its own come
+/// twice a pass, once, or less often, as one part does. A sensor that
 /// scans comes round within [`SCAN_US`], and may not be seen to pass faster than half as often; what is let through by something else
 /// may pass any number of times in between. Cost: some ten instructions an event, until half of the time is known to be filled.
 #[must_use]
 // Not inlined: flash is short.
 #[inline(never)]
-pub fn comes_in_bursts(window: &Window<'_>, most_us: f32, turn_us: f32) -> bool {
-    let Some(longest_us) = longest_gap_us(window) else { return false };
+pub fn comes_in_bursts(window: &Window<'_>, most_us: f32) -> bool {
+    let (mut filled_us, mut end_us, mut last_us, mut longest_us) = (0_u32, 0_u32, 0_u32, 0_u32);
     let (mut bursts, mut steady, mut closed_us) = (0_u32, 0_u32, 0_u32);
-    let (mut first_us, mut burst_us, mut period_us, mut last_us) = (0_u32, 0_u32, 0_u32, 0_u32);
+    let (mut first_us, mut burst_us, mut period_us) = (0_u32, 0_u32, 0_u32);
     for segment in 0..window.segments() {
         for event in window.segment(segment) {
             let t_us = event.since(window.start_us).unsigned_abs();
+            if t_us >= end_us {
+                filled_us += SLOT_US;
+                if filled_us > window.duration_us / 2 {
+                    return false;
+                }
+                end_us = (t_us | (SLOT_US - 1)) + 1;
+            }
             let gap_us = t_us.saturating_sub(last_us);
             last_us = t_us;
             if gap_us < longest_us / 2 {
                 continue;
             }
+            // What came so far are no bursts, but events of one.
+            if gap_us / 2 > longest_us {
+                (bursts, steady, closed_us) = (0, 0, 0);
+            }
+            longest_us = longest_us.max(gap_us);
             if bursts == 0 {
                 first_us = t_us;
             } else {
                 closed_us = closed_us.saturating_add(gap_us);
                 let after_us = t_us.wrapping_sub(burst_us);
-                steady += u32::from(period_us.abs_diff(after_us) < period_us / 5);
+                steady += u32::from(period_us.abs_diff(after_us) < period_us / 4);
                 period_us = after_us;
             }
             burst_us = t_us;
@@ -107,33 +120,10 @@ pub fn comes_in_bursts(window: &Window<'_>, most_us: f32, turn_us: f32) -> bool 
     let all_us = burst_us.wrapping_sub(first_us) as f32;
     let periods = (bursts - 1) as f32;
     let period_us = all_us / periods;
-    let to_a_turn = turn_us / period_us;
-    let whole = floor(to_a_turn + 0.5);
-    let passes = floor(0.5 * turn_us / most_us + 0.5);
-    let is_own = [1.0, 2.0, passes, 2.0 * passes].contains(&whole)
-        && (to_a_turn - whole).abs() * all_us < OWN_TURNS * turn_us;
+    let halves = period_us / most_us;
+    let is_own = halves > 0.5 && (halves - round(halves)).abs() * periods < OWN_HALVES;
     let is_stamped = all_us - (closed_us as f32) < STAMPED_US * periods;
     !is_own && !is_stamped && (period_us > SCAN_US || period_us > most_us)
-}
-
-/// The longest time without an event, where half of the time or more has none.
-fn longest_gap_us(window: &Window<'_>) -> Option<u32> {
-    let (mut filled_us, mut end_us, mut last_us, mut longest_us) = (0, 0, 0, 0);
-    for segment in 0..window.segments() {
-        for event in window.segment(segment) {
-            let t_us = event.since(window.start_us).unsigned_abs();
-            if t_us >= end_us {
-                filled_us += SLOT_US;
-                if filled_us > window.duration_us / 2 {
-                    return None;
-                }
-                end_us = (t_us / SLOT_US + 1) * SLOT_US;
-            }
-            longest_us = longest_us.max(t_us.saturating_sub(last_us));
-            last_us = t_us;
-        }
-    }
-    Some(longest_us)
 }
 
 /// Takes in an event of a line, if it is of one of these; 1 where that shows the line to be looked at sooner, else 0.

@@ -97,6 +97,8 @@ impl Bench {
 #[derive(Debug)]
 pub struct Measurement {
     stage: Stage,
+    /// Frequency at which all that is seen flickers, 0 for none.
+    lamp_hz: f32,
     /// Repetitions of the stage.
     turn: u8,
     /// Whether the rotor was locked in the window before.
@@ -141,10 +143,11 @@ pub struct Measurement {
 }
 
 impl Measurement {
-    /// Starts the measurement of a rotor that extraction found.
+    /// Starts the measurement of a rotor that extraction found, by the light of a lamp of this frequency, or of none that flickers: 0.
     #[must_use]
-    pub fn new(found: &Found) -> Self {
+    pub fn new(found: &Found, lamp_hz: f32) -> Self {
         Self {
+            lamp_hz,
             stage: Stage::Track,
             turn: 0,
             follows: false,
@@ -182,7 +185,7 @@ impl Measurement {
     /// known, so that the lock follows at once. The witnesses of the lock must still agree.
     #[must_use]
     pub fn follow(found: &Found, parts: Option<u8>, alike: bool) -> Self {
-        let mut following = Self::new(found);
+        let mut following = Self::new(found, 0.0);
         following.follows = true;
         following.stage = Stage::Pose;
         following.parts = parts;

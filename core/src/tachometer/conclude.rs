@@ -9,7 +9,6 @@ use crate::math::larger;
 use crate::order::sort_few;
 use crate::reading::{Evidence, Frame, Reading, Reason, RotorReading, Status};
 use crate::rotors::Disc;
-use crate::rotors::extraction::InStep;
 use crate::speed::measurement::{ENOUGH, Outcome};
 use crate::store::{Account, WINDOW_SEGMENTS};
 
@@ -122,10 +121,12 @@ impl Tachometer<'_> {
         } else if let Some(first) = rotors.first() {
             first.status
         } else {
-            Status::Refused(match self.in_step {
-                Some(InStep::TooFast) => Reason::TooFast,
-                Some(InStep::AllOver(hz)) if is_mains(hz) => Reason::Flicker,
-                _ => Reason::NoRotation,
+            Status::Refused(if self.too_fast {
+                Reason::TooFast
+            } else if self.lamp_hz > 0.0 {
+                Reason::Flicker
+            } else {
+                Reason::NoRotation
             })
         }
     }
@@ -168,8 +169,7 @@ impl Tachometer<'_> {
         }
         let mut wanted = wants.all_us;
         let refused = status.and_then(Status::reason).is_some();
-        let too_fast = self.in_step == Some(InStep::TooFast);
-        if refused && !caught_up && !too_fast {
+        if refused && !caught_up && !self.too_fast {
             wanted = larger(wanted, 1.5 * window_us);
         }
         if looks_beside {
@@ -280,13 +280,4 @@ fn rotor_reading(
     // Without polarity leading and trailing edges look alike: they may be twice as many.
     let blades = if outcome.found.ignores_polarity { stated } else { outcome.parts };
     RotorReading { id, x_px, y_px, radius_px, blades, status, speed, evidence }
-}
-
-/// Whether a frequency is twice that of the mains, or a multiple: lamps.
-fn is_mains(hz: f32) -> bool {
-    [100.0, 120.0].iter().any(|mains| {
-        let ratio = hz / mains;
-        let nearest = crate::math::round(ratio);
-        nearest >= 1.0 && (ratio - nearest).abs() * mains < 4.0
-    })
 }

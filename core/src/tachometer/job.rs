@@ -19,7 +19,7 @@ impl Tachometer<'_> {
         self.window_end_us = self.last_us + 1;
         self.candidates.clear();
         self.outcomes.clear();
-        self.in_step = None;
+        self.too_fast = false;
         self.lost = false;
         self.searched = false;
         self.ignores_polarity = false;
@@ -121,7 +121,12 @@ impl Tachometer<'_> {
                 window.ignores_polarity = self.ignores_polarity;
                 let mut view = View { window, grid, weights, times };
                 if extraction.step(&mut view, polar, self.spectrum, scratch) {
-                    self.in_step = extraction.in_step();
+                    self.too_fast = extraction.too_fast();
+                    // A rotor that explains all in the first look leaves none for a lamp.
+                    let lamp_hz = extraction.lamp_hz();
+                    if lamp_hz > 0.0 || extraction.candidates().is_empty() {
+                        self.lamp_hz = lamp_hz;
+                    }
                     self.round = extraction.round();
                     for candidate in extraction.candidates() {
                         let found = Found::new(candidate, self.ignores_polarity);
@@ -214,7 +219,7 @@ impl Tachometer<'_> {
         let Suspect { found, followed } = self.candidates[next];
         let measurement = match followed {
             Some((parts, alike)) => Measurement::follow(&found, parts, alike),
-            None => Measurement::new(&found),
+            None => Measurement::new(&found, self.lamp_hz),
         };
         self.job = Job::Measure(next, measurement);
     }

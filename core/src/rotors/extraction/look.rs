@@ -1,6 +1,6 @@
 //! A look at what keeps step with a line: which rotation explains it.
 
-use super::{Candidate, Extraction, For, InStep, Scratch, Stage, View};
+use super::{Candidate, Extraction, For, LEAST_LAMP_HZ, Scratch, Stage, View};
 use crate::limits::WINDING_PHASORS;
 use crate::math::{TAU, TurnRate, sqrt};
 use crate::rotors::belief::{LEAST_PHASORS, believe, inside};
@@ -179,7 +179,9 @@ impl Extraction {
         let empty = region.len() < LEAST_PHASORS;
         let few = region.len() < FEW_PHASORS && scratch.explainer.cell_px().is_some();
         if self.quarter == 0 && winding.windings == 0 && winding.share > SHARE_OF_ONE && !empty {
-            self.in_step = self.in_step.or(Some(InStep::AllOver(self.line.hz)));
+            if self.lamp_hz == 0.0 && self.line.hz > LEAST_LAMP_HZ {
+                self.lamp_hz = self.line.hz;
+            }
             self.all_over.push(self.line.hz).ok();
         }
         self.whole = believe(&scratch.explainer, self.line.hz);

@@ -1,7 +1,7 @@
 //! What turns too slowly to pass anywhere twice, looked for in the middle of all that moves; and before that, what turns too fast to be followed.
 
 use super::quarters::LEAST_COMPANY;
-use super::{Extraction, For, InStep, Scratch, Stage, View};
+use super::{Extraction, For, Scratch, Stage, View};
 use crate::rotors::belief::believe;
 use crate::rotors::disc::Disc;
 use crate::rotors::heat::CellGrid;
@@ -104,7 +104,7 @@ impl Extraction {
         let fast = self.looked_for == For::Fast;
         if let Some(found) = found.filter(|found| within(self.grid, found.disc)) {
             if fast {
-                self.in_step = Some(InStep::TooFast);
+                self.too_fast = true;
                 return self.done();
             }
             self.enter(found);

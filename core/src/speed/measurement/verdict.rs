@@ -237,7 +237,7 @@ impl Measurement {
         let windings = self.parts.filter(|_| self.alike).map_or(self.windings, u32::from);
         let passes_hz = windings as f32 * self.omega_rad_s.abs() / TAU;
         let most_us = 0.5e6 / passes_hz;
-        comes_in_bursts(window, most_us, 1e6 * TAU / self.omega_rad_s.abs())
+        comes_in_bursts(window, most_us)
             || passes_hz > SLOW_HZ && looks_seldom(window, self.disc, most_us)
     }
 
