@@ -1,6 +1,7 @@
 //! What must hold of the tachometer whatever it is given.
 
 mod approach;
+mod flicker;
 mod folding;
 mod hostile_events;
 mod late;
