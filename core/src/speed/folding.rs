@@ -74,7 +74,7 @@ pub fn looks_seldom(window: &Window<'_>, disc: Disc, most_us: f32) -> bool {
 /// Whether events come in bursts, as regular as a clock's, that the rotor does not make, half of whose passes take `most_us`: its own come
 /// twice a pass, once, or less often, as one part does. A sensor that
 /// scans comes round within [`SCAN_US`], and may not be seen to pass faster than half as often; what is let through by something else
-/// may pass any number of times in between. Cost: some ten instructions an event, until half of the time is known to be filled.
+/// may pass any number of times in between. Cost: some ten instructions an event, until enough of the time is known to be filled.
 #[must_use]
 // Not inlined: flash is short.
 #[inline(never)]
@@ -87,7 +87,8 @@ pub fn comes_in_bursts(window: &Window<'_>, most_us: f32) -> bool {
             let t_us = event.since(window.start_us).unsigned_abs();
             if t_us >= end_us {
                 filled_us += SLOT_US;
-                if filled_us > window.duration_us / 2 {
+                // Half of the time, with what may be ahead of that before the end.
+                if filled_us > window.duration_us / 8 + 3 * (t_us / 8) {
                     return false;
                 }
                 end_us = (t_us | (SLOT_US - 1)) + 1;
