@@ -122,7 +122,7 @@ impl Measurement {
                     return;
                 }
                 let still = 1.0 + 0.5 * (number / 2) as f32;
-                let still = if number % 2 == 0 { still } else { -still };
+                let still = if number.is_multiple_of(2) { still } else { -still };
                 (still / periods, MOST_STILL, Reason::Flicker)
             }
         };
