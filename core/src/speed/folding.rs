@@ -72,7 +72,7 @@ pub fn looks_seldom(window: &Window<'_>, disc: Disc, most_us: f32) -> bool {
 }
 
 /// Whether events come in bursts, as regular as a clock's, that the rotor does not make: its own come every half pass, which takes
-/// `most_us`, or every so many. A sensor that scans comes round within [`SCAN_US`], and nothing that it sees may pass faster than half as
+/// `most_us`, or every so many. A sensor that scans comes round within `SCAN_US`, and nothing that it sees may pass faster than half as
 /// often; before what is let through by something else, blades may pass any number of times in between. Cost: some ten instructions an
 /// event, until enough of the time is known to be filled.
 #[must_use]
