@@ -107,15 +107,16 @@ impl Measurement {
         } else {
             let lamp_hz = self.lamp_hz;
             let lamps_hz = [-120.0, -100.0, 100.0, 120.0, -lamp_hz, lamp_hz];
+            let lamps = if lamp_hz > 0.0 { lamps_hz.len() } else { MAINS };
             let number = number - SPEEDS.len();
-            if let Some(added_hz) = lamps_hz.get(number) {
-                let is_found = number >= MAINS && lamp_hz > 0.0;
+            if let Some(added_hz) = lamps_hz.get(number).filter(|_| number < lamps) {
+                let is_found = number >= MAINS;
                 let most =
                     if is_found && 2.0 * line_hz > lamp_hz { MOST_BESIDE } else { MOST_LOWER };
                 (1.0 + added_hz / line_hz, most, Reason::Flicker)
             } else {
                 // Whole periods and a half, either way.
-                let number = number - lamps_hz.len();
+                let number = number - lamps;
                 if number >= STILLS || periods <= LEAST_PERIODS {
                     self.turn = 0;
                     self.stage = Stage::Pose;
