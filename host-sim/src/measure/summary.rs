@@ -9,8 +9,10 @@ use super::mean::{Piece, mean_speed, window_us};
 /// A rotor must be measured in this share of the readings that the most seen one is measured in, else it
 /// stands in the series only.
 const LEAST_SHARE: f64 = 0.25;
-/// The same for a rotor that was found but never measured, among all readings.
+/// The same for a rotor that was found but never measured, among all readings: where none is measured, each of them searches.
 const LEAST_SHARE_REFUSED: f64 = 0.5;
+/// And beside one that is measured: while it is followed, only every third reading searches.
+const LEAST_SHARE_REFUSED_BESIDE: f64 = 0.25;
 
 /// The reading over a whole recording.
 #[derive(Clone, Debug)]
@@ -66,7 +68,9 @@ pub fn summarise(readings: &[Reading], span_us: &Range<u64>, clock_sigma_ppm: f3
                 seen >= LEAST_SHARE * most
             } else {
                 // Found but never measured: told when it is there all the time.
-                rows(readings, **id).count() as f64 >= LEAST_SHARE_REFUSED * readings.len() as f64
+                let beside = most > 0.0;
+                let share = if beside { LEAST_SHARE_REFUSED_BESIDE } else { LEAST_SHARE_REFUSED };
+                rows(readings, **id).count() as f64 >= share * readings.len() as f64
             }
         })
         .filter_map(|id| over_recording(readings, *id, span_us, clock_sigma_ppm))
@@ -200,6 +204,34 @@ mod tests {
             }
         };
         (0..).zip(rpm).map(at).collect()
+    }
+
+    #[test]
+    fn what_is_refused_in_every_search_is_told_beside_a_rotor_that_is_followed() {
+        // Found in these of eighteen readings, of which every third searches while another rotor is followed.
+        let told = |found: &[usize], is_beside: bool| {
+            let mut readings = readings(&[1500.0; 18]);
+            for (index, reading) in readings.iter_mut().enumerate() {
+                let refused = RotorReading {
+                    id: 1,
+                    status: Status::Refused(Reason::TooFast),
+                    speed: None,
+                    ..reading.rotors[0].clone()
+                };
+                let followed = is_beside.then(|| reading.rotors[0].clone());
+                let found = found.contains(&index).then_some(refused);
+                reading.rotors = followed.into_iter().chain(found).collect();
+            }
+            let summary = summarise(&readings, &(0..1_000_000), 0.0);
+            summary.rotors.iter().any(|rotor| rotor.id == 1)
+        };
+        let [all, every_third, few] =
+            [(0..18).collect(), (0..18).step_by(3).collect(), vec![0, 3, 9, 15]];
+        for (found, beside, alone) in
+            [(all, true, true), (every_third, true, false), (few, false, false)]
+        {
+            assert_eq!((told(&found, true), told(&found, false)), (beside, alone), "{found:?}");
+        }
     }
 
     #[test]

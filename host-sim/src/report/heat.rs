@@ -1,6 +1,5 @@
 //! The heat map with the rotors that were found.
 
-use evtach_core::RotorReading;
 use plotters::prelude::*;
 
 use super::{ReportError, Subject, colour};
@@ -52,7 +51,7 @@ fn paint(
         let shade = glow(f64::from(*count).sqrt() / brightest);
         area.draw(&Rectangle::new(corners, shade.filled()))?;
     }
-    for rotor in shown(subject) {
+    for rotor in &subject.summary.rotors {
         let (x, y) = at(f64::from(rotor.x_px), f64::from(rotor.y_px));
         let radius = f64::from(rotor.radius_px) * scale;
         let style = colour(rotor.id).stroke_width(3);
@@ -84,12 +83,6 @@ fn paint(
         area.draw(&Text::new(tag, (x - 60, above.max(2)), font))?;
     }
     area.present()
-}
-
-/// The rotors of the last reading that has any, else those of the summary.
-fn shown<'s>(subject: &'s Subject<'_>) -> &'s [RotorReading] {
-    let last = subject.readings.iter().rev().find(|r| r.rotors.iter().any(|r| r.speed.is_some()));
-    last.map_or(&subject.summary.rotors, |reading| reading.rotors.as_slice())
 }
 
 /// Black over violet and orange to white: brightness grows evenly, so it also reads in grey.

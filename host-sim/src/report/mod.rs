@@ -86,7 +86,7 @@ pub fn html(subject: &Subject<'_>) -> Result<String, ReportError> {
     }
     let settings = SettingsRow::new(subject.plan).to_string();
     body += &format!("<p>Measured by {PROGRAM}: {}.</p>\n", escaped(&settings));
-    body += "<h2>Where events come from</h2>\n<p>Events per cell, lighter is more. Circles: rotors of the last reading, \
+    body += "<h2>Where events come from</h2>\n<p>Events per cell, lighter is more. Circles: the rotors above, \
              dashed where no speed was given.</p>\n";
     body += &heat::draw(subject)?;
     for rotor in subject.summary.rotors.iter().filter(|r| r.speed.is_some()) {
@@ -143,7 +143,7 @@ fn escaped(text: &str) -> String {
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
-    use evtach_core::{Direction, Settings};
+    use evtach_core::{Direction, Evidence, Reason, RotorReading, Settings, Speed, Status};
 
     use super::*;
     use crate::measure::{Capacity, measure_events, summarise};
@@ -184,6 +184,57 @@ mod tests {
         assert!(page.contains(&told), "{page}");
         assert!(page.contains("a&lt;b&gt;.raw") && !page.contains("a<b>"));
         assert!(page.contains("640x480 &amp; more"));
+    }
+
+    #[test]
+    fn each_rotor_of_the_table_is_drawn_though_the_last_reading_has_not_all() {
+        let speed = Speed {
+            omega_rad_s: 314.16,
+            omega_sigma_rad_s: 0.01,
+            alpha_rad_s2: None,
+            frame: Frame::Camera,
+        };
+        let followed = RotorReading {
+            id: 0,
+            x_px: 90.0,
+            y_px: 130.0,
+            radius_px: 50.0,
+            blades: Some(3),
+            status: Status::Locked,
+            speed: Some(speed),
+            evidence: Evidence::default(),
+        };
+        let status = Status::Refused(Reason::TooFast);
+        let refused = RotorReading { id: 1, x_px: 250.0, status, speed: None, ..followed.clone() };
+        let last = Reading {
+            t_us: 75_000,
+            window_us: 150_000,
+            events: 1000,
+            thinned: 0,
+            lost: 0,
+            status: Status::Locked,
+            rotors: [followed.clone()].into_iter().collect(),
+        };
+        let geometry = Geometry::new(346, 260).unwrap();
+        let settings = Settings::new(geometry);
+        let plan =
+            Plan { settings, capacity: Capacity::Full, takes_gyro: false, since_us: 0..u64::MAX };
+        let subject = Subject {
+            plan: &plan,
+            facts: &FileFacts::default(),
+            geometry,
+            events: &[],
+            readings: &[last],
+            summary: &Summary { status: Status::Locked, rotors: vec![followed, refused] },
+            assumed: &[],
+        };
+        let drawn = heat_map(&subject).unwrap();
+        let tags: Vec<&str> = drawn
+            .lines()
+            .map(str::trim)
+            .filter(|line| line.starts_with("A ") || *line == "B")
+            .collect();
+        assert_eq!(tags, ["A 3000.0 rpm cw", "B"], "{drawn}");
     }
 
     #[test]
