@@ -5,16 +5,10 @@ use std::ops::Range;
 
 use evtach_core::{Frame, Reading, Speed};
 
+use super::line::Line;
+
 /// Windows that touch overlap by no more than what their middles are rounded by, in microseconds.
 const TOUCH_US: u64 = 2;
-/// Readings follow each other by a third of a window: every third is independent.
-const OVERLAP: f64 = 3.0;
-/// Sigmas by which a slope stands out of the errors of the readings.
-const SLOPE_SIGMAS: f64 = 4.0;
-
-/// Error of the slope of a window over that of its speed, times its length: sqrt(720) over sqrt(12), as of a line and a parabola
-/// through phases that are spread evenly.
-const SLOPE_PER_SPEED: f64 = 7.746;
 
 /// What a hand rolls a camera to and fro by, in rad/s: it is in the swing that a window shows, and not in a speed relative to the room.
 const HAND_ROLL_RAD_S: f64 = 0.2;
@@ -28,7 +22,7 @@ pub fn window_us(reading: &Reading) -> Range<u64> {
 /// The mean speed within one reading's window.
 pub struct Piece {
     window_us: Range<u64>,
-    speed: Speed,
+    pub(super) speed: Speed,
     swing_rad_s: f64,
 }
 
@@ -42,19 +36,19 @@ impl Piece {
         }
     }
 
-    fn length_us(&self) -> u64 {
+    pub(super) fn length_us(&self) -> u64 {
         self.window_us.end - self.window_us.start
     }
 
-    fn middle_us(&self) -> u64 {
+    pub(super) fn middle_us(&self) -> u64 {
         self.window_us.start.midpoint(self.window_us.end)
     }
 
-    fn omega_rad_s(&self) -> f64 {
+    pub(super) fn omega_rad_s(&self) -> f64 {
         f64::from(self.speed.omega_rad_s)
     }
 
-    fn variance(&self) -> f64 {
+    pub(super) fn variance(&self) -> f64 {
         f64::from(self.speed.omega_sigma_rad_s).powi(2)
     }
 
@@ -70,55 +64,13 @@ impl Piece {
     }
 
     /// Finite also for a sigma of zero.
-    fn weight(&self) -> f64 {
+    pub(super) fn weight(&self) -> f64 {
         1.0 / self.variance().max(f64::from(f32::MIN_POSITIVE))
     }
 }
 
-/// A straight line through all readings, each with the weight of its error; less than three are no line, and what they
-/// tell of acceleration is its slope.
-struct Line {
-    origin_us: u64,
-    t_mean_s: f64,
-    mean_rad_s: f64,
-    /// Only where it stands out of the errors of the readings, or where these told it themselves.
-    slope_rad_s2: Option<f64>,
-    slope_variance: f64,
-}
-
-impl Line {
-    fn through(pieces: &[Piece], origin_us: u64) -> Self {
-        let t_s = |piece: &Piece| seconds(origin_us, piece.middle_us());
-        let t_mean_s = weighted_mean(pieces, t_s);
-        let mean_rad_s = weighted_mean(pieces, Piece::omega_rad_s);
-        let sum =
-            |of: &dyn Fn(&Piece) -> f64| pieces.iter().map(|p| p.weight() * of(p)).sum::<f64>();
-        let tt = sum(&|p| (t_s(p) - t_mean_s).powi(2));
-        let ty = sum(&|p| (t_s(p) - t_mean_s) * (p.omega_rad_s() - mean_rad_s));
-        let (slope_rad_s2, slope_variance) = if pieces.len() >= 3 && tt > 0.0 {
-            let (slope_rad_s2, variance) = (ty / tt, OVERLAP / tt);
-            let stands_out = slope_rad_s2.abs() > SLOPE_SIGMAS * variance.sqrt();
-            (stands_out.then_some(slope_rad_s2), variance)
-        } else {
-            let told = pieces.iter().filter_map(|p| p.speed.alpha_rad_s2).map(f64::from);
-            let sum: f64 = told.sum();
-            let length_s = |p: &Piece| p.length_us().max(1) as f64 * 1e-6;
-            let variance = weighted_mean(pieces, |p| {
-                SLOPE_PER_SPEED.powi(2) * p.variance() / length_s(p).powi(2)
-            });
-            ((sum != 0.0).then(|| sum / pieces.len() as f64), variance)
-        };
-        Self { origin_us, t_mean_s, mean_rad_s, slope_rad_s2, slope_variance }
-    }
-
-    fn at(&self, us: u64) -> f64 {
-        let slope_rad_s2 = self.slope_rad_s2.unwrap_or(0.0);
-        self.mean_rad_s + slope_rad_s2 * (seconds(self.origin_us, us) - self.t_mean_s)
-    }
-}
-
 /// Mean of the readings, each with the weight of its error.
-fn weighted_mean(pieces: &[Piece], of: impl Fn(&Piece) -> f64) -> f64 {
+pub(super) fn weighted_mean(pieces: &[Piece], of: impl Fn(&Piece) -> f64) -> f64 {
     let weight: f64 = pieces.iter().map(Piece::weight).sum();
     pieces.iter().map(|p| p.weight() * of(p)).sum::<f64>() / weight
 }
@@ -259,12 +211,14 @@ fn tiles(pieces: &[Piece]) -> Vec<&Piece> {
 }
 
 /// The difference is taken in whole microseconds: late times have no exact f64.
-fn seconds(from_us: u64, to_us: u64) -> f64 {
+pub(super) fn seconds(from_us: u64, to_us: u64) -> f64 {
     to_us.wrapping_sub(from_us).cast_signed() as f64 * 1e-6
 }
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use evtach_core::Frame;
 
     use super::*;
@@ -276,6 +230,11 @@ mod tests {
 
     /// The same where readings tell how the speed swings within their windows.
     fn swinging_mean(turn_rad: impl Fn(f64) -> f64, until_ms: u64, swing_rad_s: f64) -> (f64, f64) {
+        let speed = swinging_speed(turn_rad, until_ms, swing_rad_s);
+        (f64::from(speed.omega_rad_s), f64::from(speed.omega_sigma_rad_s))
+    }
+
+    fn swinging_speed(turn_rad: impl Fn(f64) -> f64, until_ms: u64, swing_rad_s: f64) -> Speed {
         let pieces: Vec<Piece> = (0..)
             .map(|i| 50 * i..50 * i + 150)
             .take_while(|window_ms| window_ms.end <= until_ms)
@@ -295,8 +254,7 @@ mod tests {
                 }
             })
             .collect();
-        let speed = mean_speed(&pieces, &(0..until_ms * 1000), 0.0).expect("readings");
-        (f64::from(speed.omega_rad_s), f64::from(speed.omega_sigma_rad_s))
+        mean_speed(&pieces, &(0..until_ms * 1000), 0.0).expect("readings")
     }
 
     #[test]
@@ -305,6 +263,29 @@ mod tests {
         let (mean_rad_s, sigma_rad_s) = mean(turn_rad, 600);
         assert!((mean_rad_s - turn_rad(0.6) / 0.6).abs() < 1e-3, "{mean_rad_s}");
         assert!((sigma_rad_s - 0.005).abs() < 1e-4, "{sigma_rad_s}");
+    }
+
+    #[test]
+    fn what_a_motor_hunts_by_is_no_acceleration() {
+        // By 3 rad/s, in whole waves of every phase, and while it speeds up or not.
+        for (waves, until_ms) in [(1.0, 3000), (3.0, 3000), (1.0, 30_000), (30.0, 30_000)] {
+            for phase in 0..8 {
+                for alpha_rad_s2 in [0.0, 20.0] {
+                    let w = TAU * waves / (1e-3 * until_ms as f64);
+                    let phase = f64::from(phase) * TAU / 8.0;
+                    let turn_rad = |t: f64| {
+                        300.0 * t + 0.5 * alpha_rad_s2 * t * t - 3.0 / w * (w * t + phase).cos()
+                    };
+                    let told = swinging_speed(turn_rad, until_ms, 0.0).alpha_rad_s2;
+                    let right = told.map_or(alpha_rad_s2 == 0.0, |told| {
+                        // A line leans by some of a wave.
+                        let leans = 7.0 / (1e-3 * until_ms as f64) / waves;
+                        alpha_rad_s2 != 0.0 && (f64::from(told) - alpha_rad_s2).abs() < leans
+                    });
+                    assert!(right, "{waves} in {until_ms} ms: {told:?} for {alpha_rad_s2}");
+                }
+            }
+        }
     }
 
     #[test]
@@ -423,7 +404,7 @@ mod tests {
     #[test]
     fn a_swing_that_no_mean_shows_is_in_the_error_of_what_is_filled_in() {
         // Once a window: all readings are alike.
-        let w = std::f64::consts::TAU / 0.15;
+        let w = TAU / 0.15;
         let turn_rad = |t: f64| 230.0 * t + 2.0 / w * (w * t).sin();
         let (mean_rad_s, blind_rad_s) = mean(turn_rad, 640);
         let off_rad_s = (mean_rad_s - turn_rad(0.64) / 0.64).abs();

@@ -2,6 +2,7 @@
 
 mod json;
 mod letters;
+mod line;
 mod mean;
 mod parts;
 mod pause;
