@@ -177,6 +177,7 @@ mod tests {
         assert_eq!(summary.rotors[0].speed.unwrap().direction(), Direction::Cw);
         assert_eq!(page.matches("<svg").count(), 3);
         assert!(page.contains("Rotor A: phase"));
+        assert!(page.contains("about one axis, by one speed and its steady change"));
         assert!(page.contains("Rotor A: relative to the camera;"));
         let told = format!(
             "Measured by {PROGRAM}: blades 3, capacity \"full\", clock_ppm 15.0, start_s 0.0."

@@ -1,7 +1,8 @@
 //! The phase fit of one rotor: its events turned back by the measured speed, and what is left.
 //!
 //! A picture of the fit, not a measurement: where the speed is right the blades stand still from left to right; a wrong
-//! speed makes them slant, a wrong blade count makes them overlap.
+//! speed makes them slant, a wrong blade count makes them overlap. A reading tells no more than one axis, speed and acceleration of its
+//! window, though they were followed through it: how they go meanwhile is left in the picture.
 
 use std::f64::consts::TAU;
 
@@ -41,7 +42,9 @@ pub fn draw(subject: &Subject<'_>, id: u8) -> Result<Option<String>, ReportError
     let middle_s = subject.facts.t_s(reading.t_us);
     let text = format!(
         "<p>The window of {:.0} ms around {middle_s:.3} s, events turned back by the measured speed and folded by {} \
-         (light: ON, dark: OFF). Below: what is left of the phase over whole symmetry periods, in degrees of the rotor.</p>\n",
+         (light: ON, dark: OFF). Below: what is left of the phase over whole symmetry periods, in degrees of the rotor. \
+         Both are about one axis, by one speed and its steady change: the way of an axis that moves, as before a hand, and a speed \
+         that hunts are left here, though the measurement follows them; they are no error of the speed.</p>\n",
         folded.window_s * 1e3,
         rotor.blades.map_or("whole turns".to_owned(), |n| format!("{n} blades")),
     );
