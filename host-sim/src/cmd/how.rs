@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use evtach_core::limits::MOST_STATED_BLADES;
-use evtach_core::{Event, Geometry, Ignored, Reading, Roi, Settings};
+use evtach_core::{Event, Frame, Geometry, Ignored, Reading, Roi, Settings};
 use evtach_host::measure::{Capacity, FileFacts, Plan, Run, Summary, Timeline, summarise_all};
 use evtach_host::recording;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -97,6 +97,10 @@ impl How {
         bar.finish_and_clear();
         if self.gyro && !run.has_gyro {
             tell(format!("{name}: no gyro samples; speeds are relative to the camera"));
+        } else if self.gyro && leaves_roll(&run.readings) {
+            tell(format!(
+                "{name}: --gyro takes nothing out, speeds are relative to the camera: the gyro's offset is not known better than how the camera rolls; record for longer, or say by --gyro-sigma how well it is"
+            ));
         }
         // Before what is wrong, as it may be why.
         note(&recording, &name);
@@ -161,6 +165,13 @@ impl How {
         }
         settings
     }
+}
+
+/// Whether there are speeds, but none is relative to the room.
+fn leaves_roll(readings: &[Reading]) -> bool {
+    let rotors = readings.iter().flat_map(|reading| &reading.rotors);
+    let mut frames = rotors.filter_map(|rotor| rotor.speed).map(|speed| speed.frame).peekable();
+    frames.peek().is_some() && frames.all(|frame| frame == Frame::Camera)
 }
 
 /// Shows how many events were measured so far.

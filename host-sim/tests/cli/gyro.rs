@@ -127,6 +127,23 @@ fn a_recording_without_gyro_samples_says_so() {
     assert!(run.stderr.contains("inertial samples left out"), "{}", run.stderr);
 }
 
+#[test]
+fn a_gyro_that_takes_nothing_out_says_so() {
+    let folder = folder();
+    let (file, ..) = handheld(&folder, "hand.aedat4");
+    let out = folder.path().join("report.html").display().to_string();
+    let calibrated = ["--gyro", "--gyro-sigma", "0.003"];
+    for command in [&["measure", &file][..], &["plot", &file, "--out", &out]] {
+        // Of 0.3 s the offset is not known better than the hand rolls.
+        for (options, is_told) in [(&["--gyro"][..], true), (&calibrated, false), (&[], false)] {
+            let run = evtach(&[command, options].concat(), b"");
+            assert_eq!(run.code, Some(0), "{}", run.stderr);
+            let notes = run.stderr.lines().filter(|line| line.contains("--gyro takes nothing out"));
+            assert_eq!(notes.count() == 1, is_told, "{options:?}: {}", run.stderr);
+        }
+    }
+}
+
 /// A recorder writes samples with the events of their time or behind them, also where the clock is set back meanwhile.
 #[test]
 fn a_gyro_behind_a_set_back_clock_is_waited_for_as_before_it() {
