@@ -2,8 +2,9 @@
 //!
 //! Everything here is measured on synthetic recordings, whose truth is exact; [`spec`] says what they are. The
 //! tachometer is told nothing: no speed, no blade count, no centre. Whatever falls short of what is asked is named, and makes the exit
-//! code 1; of `--quick` and of few scenes of `trust` only wrong readings do, and means of few seeds of `accuracy` may be twice as far
-//! off. Times, of which one machine says little, are shown only, and so is the device's memory in `peers`.
+//! code 1; of `--quick` and of few scenes of `trust` only wrong readings do, and what fails in `peers`, and means of few seeds of
+//! `accuracy` may be twice as far off. Times, of which one machine says little, are shown only, and so is the device's memory in `peers`,
+//! unless it fails.
 
 mod accuracy;
 mod blind;

@@ -101,6 +101,7 @@ pub fn run(args: &Args) -> anyhow::Result<Report> {
         let rows: Vec<Row> = rows.collect();
         report.tables.push(table(&rows, model, seeds));
         report.records.extend(rows.iter().map(|row| row.record(model)));
+        report.short.extend(rows.iter().flat_map(|row| row.failed(model)));
         // One seed tells little.
         if !quick {
             report.short.extend(rows.iter().filter_map(|row| row.short(model)));
@@ -172,11 +173,23 @@ impl Row {
         ppm <= GOOD_PPM || ppm <= self.best() / 2.0
     }
 
+    /// Names the cell with each memory that failed: that is wrong however few seeds there are.
+    fn failed(&self, model: Model) -> Vec<String> {
+        let (condition, rpm, _) = PUBLISHED[self.cell];
+        let model = spec::model_name(model);
+        let failed = Capacity::ALL.into_iter().zip([self.full_ppm, self.device_ppm]);
+        let failed = failed.filter(|(_, ppm)| ppm.is_nan()).map(|(capacity, _)| {
+            let memory = capacity.as_str();
+            format!("{condition}, {rpm} rpm, {model} model, {memory} memory: no reading, or more than 20 % off")
+        });
+        failed.collect()
+    }
+
     /// Names the cell where more is asked.
     fn short(&self, model: Model) -> Option<String> {
         let (condition, rpm, _) = PUBLISHED[self.cell];
         let Self { full_ppm, .. } = self;
-        (!self.passes(*full_ppm)).then(|| {
+        (full_ppm.is_finite() && !self.passes(*full_ppm)).then(|| {
             let (half, model) = (self.best() / 2.0, spec::model_name(model));
             format!("{condition}, {rpm} rpm, {model} model: {full_ppm:.1} ppm, more than {GOOD_PPM} and than half the best, {half:.1}")
         })
@@ -247,7 +260,25 @@ mod tests {
         assert_eq!(row(650.0).short(Model::Edge), None);
         let short = row(651.0).short(Model::Edge).unwrap_or_default();
         assert!(short.starts_with("handheld, 20000 rpm, edge model: 651.0 ppm"), "{short}");
-        assert!(row(f64::NAN).short(Model::Edge).is_some());
+    }
+
+    #[test]
+    fn a_failure_is_named_once_with_either_memory() {
+        const FAIL: f64 = f64::NAN;
+        for (full_ppm, device_ppm, memories) in [
+            (1.0, 1.0, &[][..]),
+            (FAIL, 1.0, &["full"]),
+            (1.0, FAIL, &["device"]),
+            (FAIL, FAIL, &["full", "device"]),
+        ] {
+            let row = Row { cell: 11, full_ppm, device_ppm };
+            let failed = row.failed(Model::Edge);
+            let named = memories.iter().map(|memory| {
+                format!("handheld, 20000 rpm, edge model, {memory} memory: no reading, or more than 20 % off")
+            });
+            assert_eq!(failed, named.collect::<Vec<_>>());
+            assert_eq!(row.short(Model::Edge), None);
+        }
     }
 
     #[test]
