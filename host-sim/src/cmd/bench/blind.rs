@@ -1,8 +1,8 @@
 //! `evtach bench blind`: does it find the speed with nothing typed in?
 //!
 //! Right: the conclusive reading is within 1 % and has the right direction. Wrong: any reading of the recording is not, or
-//! tells a speed where no rotor is; that makes the exit code 1, and so does less than [`ASKED_SHARE`] right of where a reading is owed,
-//! unless it is a quick run. A reading is owed where the window holds three symmetry periods and two turns (2 s at most), the rotor makes
+//! tells a speed where no rotor is; that makes the exit code 1, and so does a wrong blade count beside a right speed, and less than
+//! [`ASKED_SHARE`] right of where a reading is owed, unless it is a quick run. A reading is owed where the window holds three symmetry periods and two turns (2 s at most), the rotor makes
 //! 2000 events a turn, it turns at most 60 000 times a minute and its blades pass at most 150 000 times; elsewhere a refusal is as good as a reading.
 
 mod tables;
@@ -70,7 +70,8 @@ struct Found {
     verdict: Verdict,
     readings: usize,
     wrong_readings: usize,
-    blades_right: bool,
+    /// Blades that were told with the speed, where they were counted.
+    blades: Option<u8>,
     /// Why there is no speed, where it was refused.
     reason: Option<&'static str>,
 }
@@ -107,6 +108,7 @@ pub fn run(args: &Args) -> anyhow::Result<Report> {
     bar.finish_and_clear();
     let outcomes: Vec<Outcome> = outcomes.into_iter().flatten().collect();
     let mut short: Vec<String> = outcomes.iter().filter_map(tables::wrong).collect();
+    short.extend(outcomes.iter().filter_map(tables::miscounted));
     if !quick {
         short.extend(
             Capacity::ALL.into_iter().filter_map(|memory| tables::refused(&outcomes, memory)),
@@ -151,18 +153,13 @@ fn measure(condition: &Condition, seed: u64) -> anyhow::Result<[Outcome; 2]> {
         let last = conclusive(&series).map(score).unwrap_or_default();
         let silent = series.last().and_then(|r| r.status.reason()).map(Reason::as_str);
         let Condition { rpm, blades, model, .. } = *condition;
-        let found = judge(&scored, &last, blades, silent);
+        let found = judge(&scored, &last, silent);
         Outcome { rpm, blades, model, seed, capacity, owed, too_fast, found }
     }))
 }
 
 /// Judges all readings of a recording, the conclusive one, and why there was no speed in the last of them.
-fn judge(
-    scored: &[Scores],
-    conclusive: &Scores,
-    blades: u8,
-    silent: Option<&'static str>,
-) -> Found {
+fn judge(scored: &[Scores], conclusive: &Scores, silent: Option<&'static str>) -> Found {
     let wrong = |s: &&Scores| {
         s.ghosts > 0 || s.rotors.iter().flatten().filter_map(|r| r.camera).any(is_wrong)
     };
@@ -178,7 +175,7 @@ fn judge(
         verdict,
         readings: scored.len(),
         wrong_readings,
-        blades_right: rotor.is_some_and(|r| r.blades == Some(blades)),
+        blades: rotor.and_then(|r| r.blades),
         reason: reason.filter(|_| verdict == Verdict::Refused),
     }
 }
@@ -201,7 +198,7 @@ pub mod tests {
     }
 
     fn verdict(scored: &[Scores]) -> (Verdict, usize) {
-        let found = judge(scored, &scored[scored.len() - 1], 3, None);
+        let found = judge(scored, &scored[scored.len() - 1], None);
         (found.verdict, found.wrong_readings)
     }
 
@@ -218,7 +215,7 @@ pub mod tests {
 
     #[test]
     fn a_refusal_is_named_by_the_rotor_and_else_by_the_reading() {
-        let reason = |last: &Scores, silent| judge(&[], last, 3, silent).reason;
+        let reason = |last: &Scores, silent| judge(&[], last, silent).reason;
         assert_eq!(reason(&refused("too_fast"), Some("ambiguous")), Some("too_fast"));
         assert_eq!(reason(&Scores::default(), Some("no_rotation")), Some("no_rotation"));
         assert_eq!(reason(&told(0.001), Some("no_rotation")), None);

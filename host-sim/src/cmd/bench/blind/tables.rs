@@ -13,7 +13,7 @@ pub fn table(title: String, all: &[&Outcome], speeds: &[f64], counts: &[u8]) -> 
     let owed = count(&|o| o.owed);
     let right = count(&|o| o.owed && o.found.verdict == Verdict::Right);
     let wrong = count(&|o| o.found.verdict == Verdict::Wrong);
-    let named = count(&|o| o.found.verdict == Verdict::Right && o.found.blades_right);
+    let named = count(&|o| o.found.verdict == Verdict::Right && blades_right(o));
     let any_right = count(&|o| o.found.verdict == Verdict::Right);
     let readings: usize = all.iter().map(|o| o.found.readings).sum();
     let wrong_readings: usize = all.iter().map(|o| o.found.wrong_readings).sum();
@@ -70,6 +70,20 @@ pub fn wrong(o: &Outcome) -> Option<String> {
     })
 }
 
+fn blades_right(o: &Outcome) -> bool {
+    o.found.blades == Some(o.blades)
+}
+
+/// Names the recording of which a wrong number of blades was told beside the right speed; what was not counted is not wrong.
+pub fn miscounted(o: &Outcome) -> Option<String> {
+    let told = o.found.blades.filter(|_| o.found.verdict == Verdict::Right && !blades_right(o))?;
+    let Outcome { rpm, blades, seed, .. } = o;
+    let (model, capacity) = (spec::model_name(o.model), o.capacity.as_str());
+    Some(format!(
+        "wrong blade count: {told}, {rpm} rpm, {blades} blades, seed {seed}, {model} model, {capacity} memory"
+    ))
+}
+
 /// Says how many are right with this memory where a reading is owed, if more is asked.
 pub fn refused(all: &[Outcome], capacity: Capacity) -> Option<String> {
     let owed: Vec<_> = all.iter().filter(|o| o.capacity == capacity && o.owed).collect();
@@ -98,7 +112,7 @@ pub fn record(o: &Outcome) -> Map<String, Value> {
         ("verdict", verdict.into()),
         ("readings", o.found.readings.into()),
         ("wrong_readings", o.found.wrong_readings.into()),
-        ("blades_right", o.found.blades_right.into()),
+        ("blades_right", blades_right(o).into()),
         ("reason", o.found.reason.into()),
     ];
     pairs.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()
@@ -116,6 +130,35 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_wrong_blade_count_beside_a_right_speed_is_named() {
+        let named = |blades, scored: &[Scores]| {
+            let found = judge(scored, &scored[0], None);
+            let outcome = Outcome {
+                rpm: 3000.0,
+                blades,
+                model: Model::Edge,
+                seed: 1,
+                capacity: Capacity::Device,
+                owed: true,
+                too_fast: false,
+                found,
+            };
+            miscounted(&outcome)
+        };
+        let uncounted = || {
+            let mut scores = told(0.001);
+            scores.rotors.iter_mut().flatten().for_each(|score| score.blades = None);
+            scores
+        };
+        let short = "wrong blade count: 3, 3000 rpm, 6 blades, seed 1, edge model, device memory";
+        assert_eq!(named(6, &[told(0.001)]).as_deref(), Some(short));
+        // Nor is it named twice where the speed is wrong, too.
+        for (blades, scores) in [(3, told(0.001)), (6, uncounted()), (6, told(0.5))] {
+            assert_eq!(named(blades, &[scores]), None);
+        }
+    }
+
+    #[test]
     fn programs_and_people_read_the_same() {
         let outcome = |rpm, too_fast: bool, last: Scores| Outcome {
             rpm,
@@ -125,7 +168,7 @@ mod tests {
             capacity: Capacity::Full,
             owed: !too_fast,
             too_fast,
-            found: judge(&[], &last, 3, Some("no_rotation")),
+            found: judge(&[], &last, Some("no_rotation")),
         };
         let outcomes = [
             outcome(3000.0, false, told(0.001)),
