@@ -8,7 +8,7 @@ use evtach_host::measure::{Capacity, Summary};
 use evtach_tests::{Truth, load, measure, pair, recordings, show};
 use serde::Deserialize;
 
-/// Largest relative error of a speed; with the device's memory it may be twice as large.
+/// Largest relative error of a speed, with either memory.
 const LARGEST_ERROR: f64 = 0.001;
 /// The same in standard errors.
 const LARGEST_ERROR_SIGMA: f64 = 4.0;
@@ -194,14 +194,10 @@ fn simulated(capacity: Capacity) {
         let truths = truth.rotors;
         assert!(!truths.is_empty(), "{file}: a reading is due, but no rotor is named");
         let (paired, ghosts) = pair(&truths, &summary);
-        let largest_error = match capacity {
-            Capacity::Full => LARGEST_ERROR,
-            Capacity::Device => 2.0 * LARGEST_ERROR,
-        };
         // A hand's own roll is in the speed and in its sigma, and no event tells the two apart.
         let largest_sigma =
             if truth.camera.handheld { f64::INFINITY } else { LARGEST_SIGMA_AT_REST };
-        let asked = Asked { largest_error, largest_sigma };
+        let asked = Asked { largest_error: LARGEST_ERROR, largest_sigma };
         for (truth, read) in truths.iter().zip(paired) {
             report.compare((&file, capacity), truth, read, asked);
         }
