@@ -1,6 +1,7 @@
 //! Speeds against their truth, and refusals where there is none to tell.
 
 mod bound;
+mod clock;
 mod contrast;
 mod gyro;
 mod lapses;

@@ -90,12 +90,13 @@ pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) 
     let slope_rad_s2 = line.slope_rad_s2.unwrap_or(0.0);
     let swing = weighted_mean(pieces, |p| p.swing_variance(slope_rad_s2));
 
+    // The clock is in all readings alike: it neither averages out nor shows in how they scatter.
     let clock = (f64::from(clock_sigma_ppm) * 1e-6 * line.mean_rad_s).powi(2);
+    let own_variance = |piece: &Piece| (piece.variance() - clock).max(0.0);
     let (mut whole_s, mut turn_rad, mut turn_variance, mut by_gyro) = (0.0, 0.0, 0.0, 0.0);
     let mut add = |length_s: f64, counts_s: f64, omega_rad_s: f64, variance: f64, frame: Frame| {
         whole_s += length_s;
         turn_rad += length_s * omega_rad_s;
-        let variance = (variance - clock).max(0.0);
         match frame {
             Frame::Camera => turn_variance += counts_s * counts_s * variance,
             // What is left of a gyro's offset is in all of them alike.
@@ -117,7 +118,7 @@ pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) 
             // What lasts for longer than a window averages out.
             let windows = (open_us.end - open_us.start) as f64 / near.length_us().max(1) as f64;
             let varies = scatter + swing / windows.max(1.0);
-            let variance = varies + own * near.variance() + moved;
+            let variance = varies + own * own_variance(near) + moved;
             let omega_rad_s = line.at(middle_us) + own * off(near);
             add(length_s, length_s, omega_rad_s, variance, near.speed.frame);
         }
@@ -125,7 +126,7 @@ pub fn mean_speed(pieces: &[Piece], span_us: &Range<u64>, clock_sigma_ppm: f32) 
     for tile in tiles {
         let length_s = tile.length_us() as f64 * 1e-6;
         let counts_s = length_s + open_s * tile.weight() / weight;
-        add(length_s, counts_s, tile.omega_rad_s(), tile.variance(), tile.speed.frame);
+        add(length_s, counts_s, tile.omega_rad_s(), own_variance(tile), tile.speed.frame);
     }
     let turn_variance = turn_variance + by_gyro * by_gyro;
     let sigma_rad_s = (turn_variance / (whole_s * whole_s) + clock).sqrt();
