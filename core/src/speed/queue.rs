@@ -15,7 +15,7 @@ use crate::store::{StoredEvent, Window};
 
 /// Events whose time is taken together: few against those of one edge that crosses a pixel, many against the microsecond.
 const GROUP: usize = 32;
-/// Most events of a place, 16 groups.
+/// Most events of a place, 32 groups: with half as many, one place in fifty of a stream of ten million a second looked busy by chance.
 const EVENTS: usize = 32 * GROUP + 1;
 /// Fewest groups that are judged.
 const LEAST_GROUPS: u32 = 8;
