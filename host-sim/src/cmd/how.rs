@@ -99,7 +99,8 @@ impl How {
             tell(format!("{name}: no gyro samples; speeds are relative to the camera"));
         } else if self.gyro && leaves_roll(&run.readings) {
             tell(format!(
-                "{name}: --gyro takes nothing out, speeds are relative to the camera: the gyro's offset is not known better than how the camera rolls; record for longer, or say by --gyro-sigma how well it is"
+                "{name}: --gyro takes nothing out, speeds are relative to the camera: the gyro's offset is not known \
+                 better than how the camera rolls; record for longer, or say by --gyro-sigma how well it is"
             ));
         }
         // Before what is wrong, as it may be why.

@@ -2,8 +2,9 @@
 //!
 //! Right: the conclusive reading is within 1 % and has the right direction. Wrong: any reading of the recording is not, or
 //! tells a speed where no rotor is; that makes the exit code 1, and so does a wrong blade count beside a right speed, and less than
-//! [`ASKED_SHARE`] right of where a reading is owed, unless it is a quick run. A reading is owed where the window holds three symmetry periods and two turns (2 s at most), the rotor makes
-//! 2000 events a turn, it turns at most 60 000 times a minute and its blades pass at most 150 000 times; elsewhere a refusal is as good as a reading.
+//! [`ASKED_SHARE`] right of where a reading is owed, unless it is a quick run. A reading is owed where the window holds three
+//! symmetry periods and two turns (2 s at most), the rotor makes 2000 events a turn, it turns at most 60 000 times a minute and
+//! its blades pass at most 150 000 times; elsewhere a refusal is as good as a reading.
 
 mod tables;
 
