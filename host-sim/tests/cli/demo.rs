@@ -27,3 +27,16 @@ fn the_demo_is_small_and_reads_as_its_truth() {
     assert_eq!(rotor["direction"], truth["direction"]);
     assert_eq!(rotor["blades"], truth["blades"]);
 }
+
+#[test]
+fn the_readme_shows_what_the_demo_reads() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let readme = std::fs::read_to_string(root.join("README.md")).expect("the README");
+    let run = evtach(&["measure", &root.join("demo/fan.raw").display().to_string()], b"");
+    // Behind the path, which is another where tests run.
+    let told = run.stdout.split_once("demo/fan.raw").map(|(_, told)| told).unwrap_or_default();
+    assert!(told.lines().count() == 2, "{}", run.stdout);
+    let shown = |line: &&str| readme.lines().any(|shown| shown.ends_with(line));
+    let missing: Vec<&str> = told.lines().filter(|line| !shown(line)).collect();
+    assert!(missing.is_empty(), "not in README.md: {missing:?}");
+}
