@@ -1,6 +1,6 @@
 //! The straight line through a series, and how a speed changed over a recording.
 
-use super::mean::{Piece, seconds, weighted_mean};
+use super::piece::{Piece, seconds, weighted_mean};
 
 /// Readings follow each other by a third of a window: every third is independent.
 const OVERLAP: f64 = 3.0;

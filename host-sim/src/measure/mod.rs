@@ -6,6 +6,7 @@ mod line;
 mod mean;
 mod parts;
 mod pause;
+mod piece;
 mod run;
 mod since;
 mod summary;

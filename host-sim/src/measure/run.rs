@@ -5,8 +5,8 @@ use std::ops::Range;
 use evtach_core::{CLOCK_RESET_US, Event, GyroSample, Ignored, Reading, Settings};
 
 use super::letters::Letters;
-use super::mean::window_us;
 use super::pause::Pauses;
+use super::piece::window_us;
 use super::wait::Wait;
 use super::{Capacity, FileFacts, Parts, Since, Timeline, drain, feed, with_tachometer};
 use crate::recording::{ImuSample, Recording, RecordingError};

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use evtach_core::{Reading, Reason, RotorReading, Status};
 
-use super::mean::{Piece, mean_speed, window_us};
+use super::mean::mean_speed;
+use super::piece::{Piece, window_us};
 
 /// A rotor must be measured in this share of the readings that the most seen one is measured in, else it
 /// stands in the series only.
