@@ -14,6 +14,7 @@ mod even;
 mod event;
 mod gyro;
 mod hold;
+mod lamp;
 mod lengthen;
 mod open;
 mod roll;

@@ -42,6 +42,8 @@ pub const LONGEST_WINDOW_US: u32 = 2_000_000;
 enum Job {
     #[default]
     Idle,
+    /// Putting a lamp's events out of sight: of segment `0` next; `1`: whether there were any.
+    Darken(usize, bool),
     /// Searching the whole image.
     Search(Extraction),
     /// Measuring candidate number `0`.
@@ -90,6 +92,8 @@ pub struct Tachometer<'m> {
     too_fast: bool,
     /// Frequency in Hz at which all that is seen flickers, 0 for none.
     lamp_hz: f32,
+    /// Whether a lamp's events are out of sight.
+    dark: bool,
     /// Whether a rotor that is followed was not locked in this window.
     lost: bool,
     /// Whether polarity is ignored in what is searched and found, as the window showed nothing sure with it.
@@ -162,6 +166,7 @@ impl<'m> Tachometer<'m> {
             outcomes: Vec::new(),
             too_fast: false,
             lamp_hz: 0.0,
+            dark: false,
             lost: false,
             ignores_polarity: false,
             tracker: Tracker::default(),
@@ -227,6 +232,7 @@ impl<'m> Tachometer<'m> {
         match &self.job {
             Job::Idle if self.window_segments > 0 => "conclusion",
             Job::Idle => "idle",
+            Job::Darken(..) => "lamp",
             Job::Search(extraction) => extraction.stage(),
             Job::Measure(_, measurement) => measurement.stage(),
         }

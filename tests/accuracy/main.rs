@@ -4,6 +4,7 @@ mod bound;
 mod clock;
 mod contrast;
 mod gyro;
+mod lamplit;
 mod lapses;
 mod layouts;
 mod mistaken;

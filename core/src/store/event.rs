@@ -18,6 +18,8 @@ impl StoredEvent {
 }
 
 const POLARITY_BIT: u16 = 0x8000;
+/// Bit of the column that no sensor has: what has it lies in no picture.
+const OUT_OF_SIGHT_BIT: u16 = 0x8000;
 /// Rows fit 11 bits ([`crate::Geometry::MAX_PX`]); the four above hold the weight.
 const ROW_BITS: u16 = 11;
 const ROW_MASK: u16 = (1 << ROW_BITS) - 1;
@@ -40,13 +42,26 @@ impl StoredEvent {
         Self { y_weight_polarity: (self.y_weight_polarity & !WEIGHT_MASK) | weight, ..self }
     }
 
+    /// The same event, out of sight or in it: nothing that looks at a place sees it there.
+    #[inline]
+    pub(super) const fn out_of_sight(self, is: bool) -> Self {
+        let bit = if is { OUT_OF_SIGHT_BIT } else { 0 };
+        Self { x: (self.x & !OUT_OF_SIGHT_BIT) | bit, ..self }
+    }
+
+    /// Time since another event, at most half an hour apart, in microseconds.
+    #[inline]
+    pub(super) const fn after_us(self, other: Self) -> i32 {
+        self.t_us.wrapping_sub(other.t_us) as i32
+    }
+
     /// How many events this one stands for, as a power of two: the others were thinned.
     #[must_use]
     pub const fn weight_log2(self) -> u8 {
         ((self.y_weight_polarity & WEIGHT_MASK) >> ROW_BITS) as u8
     }
 
-    /// Column in pixels.
+    /// Column in pixels; far beyond any sensor where the event is out of sight.
     #[must_use]
     pub const fn x(self) -> u16 {
         self.x

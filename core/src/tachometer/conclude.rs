@@ -83,6 +83,11 @@ impl Tachometer<'_> {
             }
         }
         sort_few(&mut rotors, |a, b| a.id < b.id);
+        if self.dark && !rotors.iter().any(|rotor| rotor.status == Status::Locked) {
+            // By the lamp's light the next window may show more: what passes about as often as it flickers, or makes few events.
+            self.dark = false;
+            self.store.lighten();
+        }
         let status = self.best_status(&account, &rotors);
         // What was locked and does not lock in a window that is long for the sake of something else is told by the next short one.
         let lost_to_look = self.looks_beside() && known != Status::Locked;

@@ -17,6 +17,17 @@ impl Tachometer<'_> {
     pub(super) fn start(&mut self, segments: usize) {
         self.window_segments = segments;
         self.window_end_us = self.last_us + 1;
+        if self.dark {
+            self.job = Job::Darken(0, false);
+        } else {
+            self.look();
+        }
+    }
+
+    /// Begins with what is known, or with a search.
+    // Not inlined: flash is short.
+    #[inline(never)]
+    fn look(&mut self) {
         self.candidates.clear();
         self.outcomes.clear();
         self.too_fast = false;
@@ -107,9 +118,22 @@ impl Tachometer<'_> {
 
     /// One step of the running job; `true` once the window has been measured.
     fn step(&mut self) -> bool {
+        if let Job::Darken(segment, found) = &mut self.job {
+            let found = self.store.darken(*segment, self.lamp_hz) || *found;
+            let next = *segment + 1;
+            if next < self.window_segments {
+                self.job = Job::Darken(next, found);
+            } else if found || self.dark {
+                self.dark = found;
+                self.look();
+            } else {
+                self.all_measured();
+            }
+            return false;
+        }
         let mut window = self.store.window(self.window_segments, self.window_end_us);
         match &mut self.job {
-            Job::Idle => true,
+            Job::Idle | Job::Darken(..) => true,
             Job::Search(extraction) => {
                 let grid = Visits::grid(self.settings.geometry, self.weights.len());
                 let Some(weights) = self.weights.get_mut(..grid.len()) else { return true };
@@ -124,7 +148,8 @@ impl Tachometer<'_> {
                     self.too_fast = extraction.too_fast();
                     // A rotor that explains all in the first look leaves none for a lamp.
                     let lamp_hz = extraction.lamp_hz();
-                    if lamp_hz > 0.0 || extraction.candidates().is_empty() {
+                    let none = extraction.candidates().is_empty() && !self.dark;
+                    if lamp_hz > 0.0 || none {
                         self.lamp_hz = lamp_hz;
                     }
                     self.round = extraction.round();
@@ -201,17 +226,12 @@ impl Tachometer<'_> {
         };
         let next = (index..self.candidates.len()).find(|i| !taken(&self.candidates[*i].found.disc));
         let Some(next) = next else {
-            let unsure = |o: &Outcome| o.status == Status::Refused(Reason::Ambiguous);
-            let still_unsure = !self.ignores_polarity
-                && self.outcomes.iter().any(unsure)
-                && self.tracker.known().iter().any(Known::is_ambiguous);
-            if (self.lost || still_unsure) && !self.catching_up {
-                // In this very window, outside of what was not lost. Where nothing was, without polarity: before what is brighter
-                // than the blades here and darker there, an edge changes its own on the way round.
-                self.ignores_polarity = !core::mem::take(&mut self.lost);
-                self.search_anew();
+            let locked = self.outcomes.iter().any(|outcome| outcome.status == Status::Locked);
+            if locked || self.dark || self.catching_up {
+                self.all_measured();
             } else {
-                self.job = Job::Idle;
+                // In this very window, without what a lamp makes, if there is one.
+                self.job = Job::Darken(0, false);
             }
             return;
         };
@@ -222,6 +242,24 @@ impl Tachometer<'_> {
             None => Measurement::new(&found, self.lamp_hz),
         };
         self.job = Job::Measure(next, measurement);
+    }
+
+    /// Ends with what was measured, or searches once more.
+    // Not inlined: flash is short.
+    #[inline(never)]
+    fn all_measured(&mut self) {
+        let unsure = |o: &Outcome| o.status == Status::Refused(Reason::Ambiguous);
+        let still_unsure = !self.ignores_polarity
+            && self.outcomes.iter().any(unsure)
+            && self.tracker.known().iter().any(Known::is_ambiguous);
+        if (self.lost || still_unsure) && !self.catching_up {
+            // In this very window, outside of what was not lost. Where nothing was, without polarity: before what is brighter
+            // than the blades here and darker there, an edge changes its own on the way round.
+            self.ignores_polarity = !core::mem::take(&mut self.lost);
+            self.search_anew();
+        } else {
+            self.job = Job::Idle;
+        }
     }
 }
 
