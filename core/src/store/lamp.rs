@@ -18,7 +18,7 @@ const CHANCE: f32 = 16.0;
 
 impl Store<'_> {
     /// Puts the events of a segment out of sight that a lamp makes, where one lights what is seen, and those back into sight that were put
-    /// out of it before; whether there is one. Asked are the lamps at the mains, and one of this frequency, 0 for none. Cost: about 150
+    /// out of it before; whether there is one. Asked are the lamps at the mains, and one of this frequency, 0 for none. Cost: about 250
     /// instructions an event.
     pub fn darken(&mut self, index: usize, lamp_hz: f32) -> bool {
         let slot = self.slot(index);

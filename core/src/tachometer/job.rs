@@ -215,7 +215,7 @@ impl Tachometer<'_> {
     }
 
     /// Starts measuring the next candidate from `index` on that no measured rotor overlaps; where none is left, what remains is to
-    /// conclude, in a step of its own.
+    /// ask for a lamp, where nothing is locked, and to conclude, in steps of their own.
     fn measure_next(&mut self, index: usize) {
         let taken = |disc: &Disc| {
             // Nor is a part of a rotor that is too fast a rotor.
