@@ -101,6 +101,8 @@ impl Turn {
 
     /// Direction of the vector (x, y), absolute error below 2e-7 rad; that of no vector is 0.
     #[must_use]
+    // Not inlined: flash is short.
+    #[inline(never)]
     pub fn of_vector(y: f32, x: f32) -> Self {
         let (across, along) = (y.abs(), x.abs());
         let steep = across > along;

@@ -96,6 +96,8 @@ impl CellGrid {
 
     /// Centre of a cell in pixels.
     #[must_use]
+    // Not inlined: flash is short.
+    #[inline(never)]
     pub fn centre(self, index: usize) -> (f32, f32) {
         let half = 0.5 * (self.cell_px() - 1.0);
         let column = (index % self.columns) as f32;

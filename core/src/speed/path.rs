@@ -102,6 +102,8 @@ impl Path {
 
     /// The block that an instant lies in, and how far through it: 0 to 1, beyond it outside the path.
     #[must_use]
+    // Not inlined: flash is short.
+    #[inline(never)]
     fn place(&self, t_us: f32) -> (usize, f32) {
         let place = (t_us - self.start_us) * self.per_us;
         // Casting a negative float gives 0.

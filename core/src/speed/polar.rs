@@ -91,6 +91,8 @@ impl PolarEvent {
     }
 
     // One by one, as numbers are handed over in registers, and tuples in memory.
+    // Not inlined: flash is short.
+    #[inline(never)]
     fn at(dx: f32, dy: f32, r2: f32, polarity: u16, t_us: i32) -> Self {
         let angle = (Turn::of_vector(dy, dx).0 >> 16) as u16;
         let radius = ((quick_sqrt(r2) * 16.0) as u16).min(0x7FFF);
