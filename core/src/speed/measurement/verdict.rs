@@ -308,7 +308,11 @@ impl Measurement {
         let rival = 1.0 / (self.windings as f32 - 1.0_f32.copysign(off));
         let is_rival = off.abs() > REFINED_OFF_SIGMAS * sigma
             && (off.abs() - rival).abs() < REFINED_RIVAL_SIGMAS * sigma;
-        is_rival || off.abs() > (REFINED_SIGMAS * sigma).max(REFINED_AGREEMENT)
+        // What is left of a flickering lamp's events leads astray what else tells a harmonic from its neighbour.
+        let vague = self.lamp_hz > 0.0 && sigma > 0.5 / (self.windings as f32 + 1.0);
+        is_rival
+            || vague && self.closely_rivalled()
+            || off.abs() > (REFINED_SIGMAS * sigma).max(REFINED_AGREEMENT)
     }
 
     /// Whether the rotor is also where it should be between whole periods, where an alias is not.
@@ -453,6 +457,7 @@ fn roll_share(window_s: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rotors::Found;
     use crate::store::{MOST_SEGMENTS, MOST_SPARE, Store, StoredEvent};
 
     #[test]
@@ -477,5 +482,17 @@ mod tests {
         assert!((apart.omega_rad_s - 105.0).abs() < 1e-3 && apart.sigma_rad_s > 4.0);
         let rough = combine(told(100.0, 1.0), told(110.0, 100.0), 1.0);
         assert!((rough.omega_rad_s - 100.0).abs() < 0.01 && rough.sigma_rad_s < 1.1);
+    }
+    #[test]
+    fn by_a_lamp_the_refinement_must_tell_a_harmonic_from_its_rival() {
+        let denies = |lamp_hz, refined_sigma_rad_s| {
+            let found = Found { omega_rad_s: 20.0, windings: 2, ..Found::default() };
+            let mut rivalled = Measurement::new(&found, lamp_hz);
+            rivalled.evidence.scan_standing = Some(0.74);
+            rivalled.evidence.refined_rad_s = Some(18.0);
+            rivalled.evidence.refined_sigma_rad_s = Some(refined_sigma_rad_s);
+            rivalled.refinement_denies(20.0)
+        };
+        assert!(denies(120.0, 5.0) && !denies(120.0, 2.0) && !denies(0.0, 5.0));
     }
 }
