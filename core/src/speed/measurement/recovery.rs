@@ -51,6 +51,8 @@ const MOST_LOWER: f32 = 1.1;
 /// The same with twice or thrice the speed where the parts differ or there is but one, which about an axis that is not found
 /// exactly does not turn evenly: rigid ones reach 0.36, mistaken speeds 0.43 and more.
 const MOST_UNEVEN: f32 = 0.4;
+/// Share in step with twice or thrice the speed, beyond what uneven sight makes, up to which that is its reason.
+const MOST_BEYOND_UNEVEN: f32 = 0.1;
 /// Share in step with other windings over that with the ones at hand, less what uneven sight makes, from which on it is no rigid
 /// rotor's: these reach 0.11 in random scenes, and 0.31 of a few hundred events; mistaken speeds 0.49 and more.
 const MOST_OTHER_WINDINGS: f32 = 0.35;
@@ -129,7 +131,12 @@ impl Measurement {
         };
         let omega_rad_s = speed * self.omega_rad_s;
         let share = self.in_step(polar, omega_rad_s, self.harmonic);
-        if share > most * self.evidence.coherence.unwrap_or(0.0) {
+        // Where it is seen unevenly around, a mark keeps as much step with whole multiples of its speed as that is.
+        let beyond = if reason == Reason::TooFast { (speed - 1.0) as u32 } else { 0 };
+        if share > most * self.evidence.coherence.unwrap_or(0.0)
+            && (beyond == 0
+                || share - self.in_step(polar, 0.0, beyond * self.harmonic) > MOST_BEYOND_UNEVEN)
+        {
             self.refuse(reason);
         }
     }
