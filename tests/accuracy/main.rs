@@ -8,6 +8,7 @@ mod lamplit;
 mod lapses;
 mod layouts;
 mod mistaken;
+mod neighbours;
 mod readout;
 mod recordings;
 mod series;

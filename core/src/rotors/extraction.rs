@@ -72,6 +72,8 @@ pub struct Found {
     pub windings: u32,
     /// Whether it was found, and is measured, without regard to polarity.
     pub ignores_polarity: bool,
+    /// Whether it is the rival of what was refused: another harmonic of the same line about its own centre.
+    pub rival: bool,
     /// Whether polarities were the other way round in parts of it, once it was measured.
     pub sided: bool,
     /// How it is tilted, once that was asked.

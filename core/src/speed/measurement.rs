@@ -107,6 +107,8 @@ pub struct Measurement {
     second_look: bool,
     /// Looks about the centre for a harmonic that keeps step better.
     doubt: Option<Doubt>,
+    /// Whether it is the rival of what was refused.
+    is_rival: bool,
     disc: Disc,
     omega_rad_s: f32,
     /// Whether few of its events keep step.
@@ -151,8 +153,9 @@ impl Measurement {
             stage: Stage::Track,
             turn: 0,
             follows: false,
-            second_look: false,
+            second_look: found.rival,
             doubt: None,
+            is_rival: found.rival,
             disc: found.disc,
             omega_rad_s: found.omega_rad_s,
             faint: false,
@@ -247,6 +250,8 @@ impl Measurement {
     }
 
     /// Share of the events that keep step with a speed in an angular harmonic, 0 to 1.
+    // Not inlined: flash is short.
+    #[inline(never)]
     fn in_step(&self, polar: &[PolarEvent], omega_rad_s: f32, harmonic: u32) -> f32 {
         self.coherence(polar, omega_rad_s, harmonic).0
     }

@@ -177,12 +177,16 @@ impl Tachometer<'_> {
                     return false;
                 }
                 let (index, mut outcome) = (*index, measurement.result());
+                let rival = measurement.rival(window.ignores_polarity);
                 outcome.found.ignores_polarity = window.ignores_polarity;
                 if candidate.followed.is_some() && outcome.status != Status::Locked {
                     // The others are followed all the same.
                     self.lost = true;
                 } else {
                     self.keep(outcome);
+                }
+                if let Some(rival) = rival {
+                    suspect(&mut self.candidates, rival);
                 }
                 self.measure_next(index + 1);
                 false

@@ -6,7 +6,8 @@
 
 use super::{Measurement, Stage};
 use crate::math::{TAU, larger};
-use crate::rotors::Disc;
+use crate::reading::{Reason, Status};
+use crate::rotors::{Disc, Found};
 use crate::speed::angular::AngularSums;
 use crate::speed::phase::scan;
 use crate::speed::polar::{Annulus, PolarTrack, track};
@@ -65,6 +66,8 @@ pub(super) struct Doubt {
     share: f32,
     rival_share: f32,
     best: (Disc, i32),
+    /// Best place of the rival.
+    rival: (Disc, i32),
 }
 
 impl Doubt {
@@ -83,6 +86,7 @@ impl Doubt {
             share: 0.0,
             rival_share: 0.0,
             best: (disc, 0),
+            rival: (disc, 0),
         }
     }
 
@@ -149,15 +153,15 @@ impl Doubt {
         let seen = polar.get(collected..).unwrap_or(&[]);
         let found = scan(angular, seen, place, self.line_hz);
         polar.truncate(collected);
-        let mut less = (found.share, found.best);
+        let mut less = (found.share, (place, found.best));
         if found.share > self.share {
-            less = (self.share, self.best.1);
+            less = (self.share, self.best);
             self.share = found.share;
             self.best = (place, found.best);
         }
         // Whoever is not the best is its rival.
-        if less.1 != self.best.1 {
-            self.rival_share = larger(self.rival_share, less.0);
+        if less.1.1 != self.best.1 && less.0 > self.rival_share {
+            (self.rival_share, self.rival) = less;
         }
     }
 }
@@ -184,6 +188,27 @@ fn keep(polar: &mut PolarTrack, moment: bool) {
 }
 
 impl Measurement {
+    /// The rival of what is refused as ambiguous, about its own best place: it may be the right one. It has none itself.
+    // Not inlined: flash is short.
+    #[inline(never)]
+    #[must_use]
+    pub fn rival(&self, ignores_polarity: bool) -> Option<Found> {
+        let doubt = self.doubt.as_ref()?;
+        let (disc, harmonic) = doubt.rival;
+        let omega_rad_s = doubt.line_hz * TAU / harmonic as f32;
+        let windings = harmonic.unsigned_abs();
+        let other = harmonic != 0 && harmonic != doubt.best.1 && !doubt.small;
+        let ambiguous = self.status == Status::Refused(Reason::Ambiguous);
+        (ambiguous && other && !self.faint).then_some(Found {
+            disc,
+            omega_rad_s,
+            windings,
+            ignores_polarity,
+            rival: true,
+            ..Found::default()
+        })
+    }
+
     /// Whether another harmonic keeps step almost as well wherever the centre is thought to be, and no overtone settles it: only a sharp
     /// one does where a centre that is off by little leads from one to the next.
     pub(super) fn in_doubt(&self) -> bool {
@@ -194,13 +219,14 @@ impl Measurement {
         let rivalled = |doubt: &Doubt| {
             (doubt.small || !settled) && doubt.rival_share > MOST_RIVAL * doubt.share
         };
-        !settled && self.closely_rivalled() || self.doubt.as_ref().is_some_and(rivalled)
+        !settled && (self.is_rival || self.closely_rivalled())
+            || self.doubt.as_ref().is_some_and(rivalled)
     }
 
     /// Whether the centre is to be looked about, as another harmonic keeps step too.
     pub(super) fn is_to_be_doubted(&self, rival: f32) -> bool {
         let doubtful = if is_small(self.disc, self.harmonic) { SMALL_DOUBTFUL } else { DOUBTFUL };
-        self.doubt.is_none() && rival > doubtful
+        self.doubt.is_none() && !self.is_rival && rival > doubtful
     }
 
     /// Whether there is any doubt: too much where no lock tells a harmonic from its neighbour.
