@@ -483,6 +483,7 @@ mod tests {
         let rough = combine(told(100.0, 1.0), told(110.0, 100.0), 1.0);
         assert!((rough.omega_rad_s - 100.0).abs() < 0.01 && rough.sigma_rad_s < 1.1);
     }
+
     #[test]
     fn by_a_lamp_the_refinement_must_tell_a_harmonic_from_its_rival() {
         let denies = |lamp_hz, refined_sigma_rad_s| {
