@@ -99,6 +99,8 @@ pub struct Measurement {
     stage: Stage,
     /// Frequency at which all that is seen flickers, 0 for none.
     lamp_hz: f32,
+    /// Whether a lamp lights it: this one, or one whose events are out of sight.
+    by_lamp: bool,
     /// Repetitions of the stage.
     turn: u8,
     /// Whether the rotor was locked in the window before.
@@ -145,11 +147,13 @@ pub struct Measurement {
 }
 
 impl Measurement {
-    /// Starts the measurement of a rotor that extraction found, by the light of a lamp of this frequency, or of none that flickers: 0.
+    /// Starts the measurement of a rotor that extraction found, by the light of a lamp of this frequency, or of none that the search saw
+    /// flicker: 0; `dark` where a lamp's events are out of sight.
     #[must_use]
-    pub fn new(found: &Found, lamp_hz: f32) -> Self {
+    pub fn new(found: &Found, lamp_hz: f32, dark: bool) -> Self {
         Self {
             lamp_hz,
+            by_lamp: dark || lamp_hz > 0.0,
             stage: Stage::Track,
             turn: 0,
             follows: false,
@@ -188,7 +192,7 @@ impl Measurement {
     /// known, so that the lock follows at once. The witnesses of the lock must still agree.
     #[must_use]
     pub fn follow(found: &Found, parts: Option<u8>, alike: bool) -> Self {
-        let mut following = Self::new(found, 0.0);
+        let mut following = Self::new(found, 0.0, false);
         following.follows = true;
         following.stage = Stage::Pose;
         following.parts = parts;

@@ -243,7 +243,7 @@ impl Tachometer<'_> {
         let Suspect { found, followed } = self.candidates[next];
         let measurement = match followed {
             Some((parts, alike)) => Measurement::follow(&found, parts, alike),
-            None => Measurement::new(&found, self.lamp_hz),
+            None => Measurement::new(&found, self.lamp_hz, self.dark),
         };
         self.job = Job::Measure(next, measurement);
     }

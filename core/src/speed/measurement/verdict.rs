@@ -309,7 +309,7 @@ impl Measurement {
         let is_rival = off.abs() > REFINED_OFF_SIGMAS * sigma
             && (off.abs() - rival).abs() < REFINED_RIVAL_SIGMAS * sigma;
         // What is left of a flickering lamp's events leads astray what else tells a harmonic from its neighbour.
-        let vague = self.lamp_hz > 0.0 && sigma > 0.5 / (self.windings as f32 + 1.0);
+        let vague = self.by_lamp && sigma > 0.5 / (self.windings as f32 + 1.0);
         is_rival
             || vague && self.closely_rivalled()
             || off.abs() > (REFINED_SIGMAS * sigma).max(REFINED_AGREEMENT)
@@ -486,14 +486,15 @@ mod tests {
 
     #[test]
     fn by_a_lamp_the_refinement_must_tell_a_harmonic_from_its_rival() {
-        let denies = |lamp_hz, refined_sigma_rad_s| {
+        let denies = |lamp_hz, dark, refined_sigma_rad_s| {
             let found = Found { omega_rad_s: 20.0, windings: 2, ..Found::default() };
-            let mut rivalled = Measurement::new(&found, lamp_hz);
+            let mut rivalled = Measurement::new(&found, lamp_hz, dark);
             rivalled.evidence.scan_standing = Some(0.74);
             rivalled.evidence.refined_rad_s = Some(18.0);
             rivalled.evidence.refined_sigma_rad_s = Some(refined_sigma_rad_s);
             rivalled.refinement_denies(20.0)
         };
-        assert!(denies(120.0, 5.0) && !denies(120.0, 2.0) && !denies(0.0, 5.0));
+        assert!(denies(120.0, true, 5.0) && denies(120.0, false, 5.0) && denies(0.0, true, 5.0));
+        assert!(!denies(120.0, true, 2.0) && !denies(0.0, false, 5.0));
     }
 }
