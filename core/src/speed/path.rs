@@ -100,15 +100,9 @@ impl Path {
         &mut self.knots
     }
 
-    /// The block that an instant lies in, and how far through it: 0 to 1, beyond it outside the path.
-    #[must_use]
-    // Not inlined: flash is short.
-    #[inline(never)]
-    fn place(&self, t_us: f32) -> (usize, f32) {
-        let place = (t_us - self.start_us) * self.per_us;
-        // Casting a negative float gives 0.
-        let index = (place as usize).min(self.blocks().saturating_sub(1));
-        (index, place - index as f32)
+    /// How many blocks lie before an instant.
+    fn place(&self, t_us: f32) -> f32 {
+        (t_us - self.start_us) * self.per_us
     }
 
     /// The instant so far through a block, in microseconds since the middle of the window.
@@ -122,14 +116,17 @@ impl Path {
     // Not inlined: flash is short.
     #[inline(never)]
     pub fn at(&self, t_us: f32) -> Knot {
-        let (index, f) = self.place(t_us);
-        self.stretch(index).at(f)
+        let place = self.place(t_us);
+        let stretch = self.stretch(place);
+        stretch.at(place - stretch.index as f32)
     }
 
-    /// The way through a block.
+    /// The way through the block at a place, or through that next to it.
     // Not inlined: flash is short.
     #[inline(never)]
-    fn stretch(&self, index: usize) -> Stretch {
+    fn stretch(&self, place: f32) -> Stretch {
+        // Casting a negative float gives 0.
+        let index = (place as usize).min(self.blocks().saturating_sub(1));
         let (Some(a), Some(b)) = (self.knots.get(index), self.knots.get(index + 1)) else {
             return Stretch { index, ..Stretch::default() };
         };
@@ -188,7 +185,7 @@ impl<'p> Moving<'p> {
     #[must_use]
     pub fn new(disc: Disc, path: &'p Path, window: &Window<'_>) -> Self {
         let middle_us = (window.duration_us / 2) as i32;
-        let (annulus, stretch) = (Annulus::of(disc), path.stretch(0));
+        let (annulus, stretch) = (Annulus::of(disc), path.stretch(0.0));
         Self { annulus, path, stretch, start_us: window.start_us, middle_us }
     }
 
@@ -202,11 +199,13 @@ impl<'p> Moving<'p> {
     /// The block that an instant lies in, how far through it, and where the rotor was then: `t_us` after the middle of the window.
     #[inline]
     pub fn follow(&mut self, t_us: i32) -> (usize, f32, Knot) {
-        let (index, f) = self.path.place(t_us as f32);
-        if index != self.stretch.index {
-            self.stretch = self.path.stretch(index);
+        let place = self.path.place(t_us as f32);
+        let mut f = place - self.stretch.index as f32;
+        if !(0.0..1.0).contains(&f) {
+            self.stretch = self.path.stretch(place);
+            f = place - self.stretch.index as f32;
         }
-        (index, f, self.stretch.at(f))
+        (self.stretch.index, f, self.stretch.at(f))
     }
 
     /// The same, where the path is known for the instant of the event.
