@@ -4,6 +4,7 @@ mod baselines;
 mod coarse;
 mod doubt;
 mod edges;
+mod error_bar;
 mod recovery;
 mod verdict;
 
