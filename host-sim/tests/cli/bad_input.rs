@@ -448,3 +448,17 @@ fn no_room_for_the_answer() {
     assert_eq!(output.status.code(), Some(2), "{stderr}");
     assert!(stderr.contains("standard output: No space left"), "{stderr}");
 }
+
+/// As `| head` leaves it.
+#[test]
+fn nobody_reads_the_answer() {
+    let (reader, writer) = std::io::pipe().expect("a pipe");
+    drop(reader);
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_evtach"))
+        .args(["bench", "trust", "--show", "1"])
+        .stdout(writer)
+        .output()
+        .expect("evtach starts");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!((output.status.code(), &*stderr), (Some(0), ""));
+}

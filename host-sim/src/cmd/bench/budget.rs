@@ -12,6 +12,7 @@ use evtach_firmware::sensor::spi::{Bridge, Kind};
 use evtach_host::device::{self, Image, Used};
 use evtach_host::synth::{self, Rotor, Scene};
 
+use super::say_line;
 use crate::cmd::tell;
 
 /// Arguments of `evtach bench budget`.
@@ -46,10 +47,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let one = vec![Rotor { blades: 3, rpm: 1000.0, radius_px: 42.0, ..Rotor::default() }];
     let used = play(&image, "one rotor", one, args.seconds)?;
     let good = [
-        most("instructions a second", instructions_per_s(&used), ASKED_INSTRUCTIONS_PER_S),
-        least("readings a second", readings_per_s(&used, 1), ASKED_READINGS),
-        most("internal RAM, bytes", print_ram(&image, &used), ASKED_RAM_BYTES),
-        most("flash, bytes", image.flash_bytes, ASKED_FLASH_BYTES),
+        most("instructions a second", instructions_per_s(&used), ASKED_INSTRUCTIONS_PER_S)?,
+        least("readings a second", readings_per_s(&used, 1), ASKED_READINGS)?,
+        most("internal RAM, bytes", print_ram(&image, &used)?, ASKED_RAM_BYTES)?,
+        most("flash, bytes", image.flash_bytes, ASKED_FLASH_BYTES)?,
     ];
     let places = [
         (90.0, 65.0, 2270.0),
@@ -66,7 +67,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         ..Rotor::default()
     });
     let used = play(&image, "four rotors", four.to_vec(), args.seconds)?;
-    let each = least("readings a second of each", readings_per_s(&used, 4), ASKED_READINGS_OF_FOUR);
+    let each =
+        least("readings a second of each", readings_per_s(&used, 4), ASKED_READINGS_OF_FOUR)?;
     Ok(ExitCode::from(u8::from(!(each && good.iter().all(|good| *good)))))
 }
 
@@ -77,26 +79,23 @@ fn play(image: &Image, name: &str, rotors: Vec<Rotor>, seconds: u32) -> anyhow::
     let (stream, rate) = stream(rotors, f64::from(seconds))?;
     tell("running it in QEMU");
     let used = device::run_instrument(image, &stream, seconds)?;
-    println!(
+    say_line(format!(
         "{name}, {} rpm, {:.2} Mev/s, screen at 4 Hz, every reading told over the link",
         rpm.join(", "),
         rate * 1e-6
-    );
-    println!("  instructions in each second");
+    ))?;
+    say_line("  instructions in each second")?;
     for (name, seconds) in used.instructions.iter().filter(|(name, _)| name != "sleep") {
-        print!("  {name:<24}");
-        for instructions in seconds {
-            print!("{instructions:>14}");
-        }
-        println!();
+        let seconds: String = seconds.iter().map(|spent| format!("{spent:>14}")).collect();
+        say_line(format!("  {name:<24}{seconds}"))?;
     }
     for (letter, ends) in ('A'..).zip(&used.read_s) {
         // The second window begins with what came while the first was searched and measured.
         let second = ends.get(1).copied().unwrap_or(f64::NAN);
-        println!(
+        say_line(format!(
             "  {letter}: {} readings; the window of the second ends at {second:.2} s",
             ends.len()
-        );
+        ))?;
     }
     Ok(used)
 }
@@ -157,23 +156,23 @@ fn readings_per_s(used: &Used, rotors: usize) -> f64 {
     used.read_s.iter().map(rate).reduce(f64::min).unwrap_or(0.0)
 }
 
-fn print_ram(image: &Image, used: &Used) -> u64 {
-    println!("  {:<24}{:>14}", "variables, bytes", image.ram_bytes);
-    println!("  {:<24}{:>14}", "stack while starting", used.stack_starting);
-    println!("  {:<24}{:>14}", "stack while running", used.stack_running);
-    image.ram_bytes + used.stack_starting.max(used.stack_running)
+fn print_ram(image: &Image, used: &Used) -> anyhow::Result<u64> {
+    say_line(format!("  {:<24}{:>14}", "variables, bytes", image.ram_bytes))?;
+    say_line(format!("  {:<24}{:>14}", "stack while starting", used.stack_starting))?;
+    say_line(format!("  {:<24}{:>14}", "stack while running", used.stack_running))?;
+    Ok(image.ram_bytes + used.stack_starting.max(used.stack_running))
 }
 
 /// Prints a value beside what it may be at most, and returns whether it is within that.
-fn most(name: &str, value: u64, asked: u64) -> bool {
+fn most(name: &str, value: u64, asked: u64) -> anyhow::Result<bool> {
     let verdict = if value <= asked { "within" } else { "PAST" };
-    println!("{name:<26}{value:>14}  {verdict} the {asked} asked");
-    value <= asked
+    say_line(format!("{name:<26}{value:>14}  {verdict} the {asked} asked"))?;
+    Ok(value <= asked)
 }
 
 /// Prints a value beside what it must be at least, and returns whether it is.
-fn least(name: &str, value: f64, asked: f64) -> bool {
+fn least(name: &str, value: f64, asked: f64) -> anyhow::Result<bool> {
     let verdict = if value >= asked { "within" } else { "SHORT OF" };
-    println!("{name:<26}{value:>14.1}  {verdict} the {asked} asked");
-    value >= asked
+    say_line(format!("{name:<26}{value:>14.1}  {verdict} the {asked} asked"))?;
+    Ok(value >= asked)
 }

@@ -16,6 +16,7 @@ use evtach_host::device::{
 use evtach_host::recording::{self, OpenOptions};
 use evtach_host::synth::{self, Rotor, Scene};
 
+use super::say_line;
 use crate::cmd::tell;
 
 /// Arguments of `evtach bench cost`.
@@ -53,7 +54,7 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         tell(format!("playing {} in QEMU", played.name));
         let output = device::run(&image, played.geometry, &played.events, Pace::File)?;
         let spent = Spent::of(&output);
-        print_run(&played, &output, &spent);
+        print_run(&played, &output, &spent)?;
         past.extend(
             spent.past_what_is_asked().into_iter().map(|p| format!("{}: {p}", played.name)),
         );
@@ -62,14 +63,14 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
             past.push(format!("{}: no reading after lock, of which a limit is asked", played.name));
         }
         let live = device::run(&image, played.geometry, &played.events, Pace::Sensor)?;
-        print_live(&played, &live);
+        print_live(&played, &live)?;
         memory = Some(output.memory);
     }
     if let Some(memory) = memory {
-        print_bytes(&image, &memory);
+        print_bytes(&image, &memory)?;
     }
     for past in &past {
-        println!("{past}");
+        say_line(past)?;
     }
     Ok(if past.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
@@ -163,62 +164,69 @@ fn made_up() -> anyhow::Result<Vec<Played>> {
         .collect()
 }
 
-fn print_run(played: &Played, output: &Output, spent: &Spent) {
+fn print_run(played: &Played, output: &Output, spent: &Spent) -> anyhow::Result<()> {
     let duration_s = duration_s(&played.events);
-    println!(
+    say_line(format!(
         "{}: {}x{}, {duration_s:.3} s, {} events",
         played.name,
         played.geometry.width_px,
         played.geometry.height_px,
         grouped(output.events)
-    );
-    println!("  {:<24}{:>16.1} instructions", "taking in one event", spent.per_event);
-    println!("  {:<24}{:>16}{:>12}{:>16}", "stage", "instructions", "calls", "longest call");
+    ))?;
+    say_line(format!("  {:<24}{:>16.1} instructions", "taking in one event", spent.per_event))?;
+    say_line(format!(
+        "  {:<24}{:>16}{:>12}{:>16}",
+        "stage", "instructions", "calls", "longest call"
+    ))?;
     for CallCost { name, calls, ticks, longest_ticks } in &output.stages {
-        println!(
+        say_line(format!(
             "  {name:<24}{:>16}{:>12}{:>16}",
             grouped(instructions(*ticks)),
             grouped(*calls),
             grouped(instructions(*longest_ticks))
-        );
+        ))?;
     }
-    println!("  {:<24}{:>16} instructions", "longest step", grouped(spent.longest_step));
-    print_readings(output, spent);
+    say_line(format!("  {:<24}{:>16} instructions", "longest step", grouped(spent.longest_step)))?;
+    print_readings(output, spent)?;
     let all = instructions(output.push.ticks + output.stages.iter().map(|s| s.ticks).sum::<u64>());
-    println!(
+    say_line(format!(
         "  {:<24}{:>16.1} million instructions per second of recording",
         "in all",
         all as f64 / duration_s / 1e6
-    );
+    ))
 }
 
 /// What the first reading with a speed costs, and each after the first locked one.
-fn print_readings(output: &Output, spent: &Spent) {
+fn print_readings(output: &Output, spent: &Spent) -> anyhow::Result<()> {
     let Some(first) = spent.first else {
-        return println!("  no reading among {}", output.readings.len());
+        return say_line(format!("  no reading among {}", output.readings.len()));
     };
-    println!("  {:<24}{:>16} instructions of measuring", "first reading", grouped(first));
+    say_line(format!("  {:<24}{:>16} instructions of measuring", "first reading", grouped(first)))?;
     let Some((mean, count)) = spent.after_lock else {
-        return println!("  no reading after a locked one");
+        return say_line("  no reading after a locked one");
     };
-    println!("  {:<24}{:>16} instructions, mean of {count}", "reading after lock", grouped(mean));
+    say_line(format!(
+        "  {:<24}{:>16} instructions, mean of {count}",
+        "reading after lock",
+        grouped(mean)
+    ))
 }
 
-fn print_live(played: &Played, live: &Output) {
+fn print_live(played: &Played, live: &Output) -> anyhow::Result<()> {
     let lost = played.events.len() as u64 - live.events;
-    println!("  played live, at 250 million instructions per second:");
-    println!("  {:<24}{:>16}", "  readings", live.readings.len());
-    println!("  {:<24}{:>16} events found no free block", "  lost", grouped(lost));
-    println!(
+    say_line("  played live, at 250 million instructions per second:")?;
+    say_line(format!("  {:<24}{:>16}", "  readings", live.readings.len()))?;
+    say_line(format!("  {:<24}{:>16} events found no free block", "  lost", grouped(lost)))?;
+    say_line(format!(
         "  {:<24}{:>16} events in windows given up",
         "  measured too late",
         grouped(live.overrun)
-    );
-    println!();
+    ))?;
+    say_line("")
 }
 
-fn print_bytes(image: &Image, memory: &MemoryUse) {
-    println!("bytes on the device");
+fn print_bytes(image: &Image, memory: &MemoryUse) -> anyhow::Result<()> {
+    say_line("bytes on the device")?;
     for (name, bytes) in [
         ("flash", image.flash_bytes),
         ("variables in RAM", image.ram_bytes),
@@ -228,8 +236,9 @@ fn print_bytes(image: &Image, memory: &MemoryUse) {
         ("  blocks of events", memory.blocks_bytes),
         ("deepest stack", memory.stack_bytes),
     ] {
-        println!("  {name:<24}{:>16}", grouped(bytes));
+        say_line(format!("  {name:<24}{:>16}", grouped(bytes)))?;
     }
+    Ok(())
 }
 
 fn instructions(ticks: u64) -> u64 {

@@ -9,6 +9,8 @@ use evtach_core::{Event, Geometry, Polarity};
 use evtach_host::recording::write::{self, WriteFormat};
 use evtach_host::recording::{self, OpenOptions};
 
+use super::say_line;
+
 /// Arguments of `evtach bench decode`.
 #[derive(clap::Args)]
 pub struct Args {
@@ -165,25 +167,25 @@ fn faery(file: &Path, python: &Path, events: u64) -> anyhow::Result<Option<f64>>
 
 fn print(rows: &[Row], json: bool) -> anyhow::Result<()> {
     if json {
-        println!("{}", serde_json::to_string(rows)?);
+        say_line(serde_json::to_string(rows)?)?;
         return Ok(());
     }
-    println!(
+    say_line(format!(
         "{:<8} {:>8} {:>10} {:>14} {:>13} {:>7}",
         "format", "MB", "events", "evtach Mev/s", "faery Mev/s", "ratio"
-    );
+    ))?;
     for row in rows {
         let (faery, ratio) = match row.faery_mev_s {
             Some(faery) => (format!("{faery:.1}"), format!("{:.2}", row.evtach_mev_s / faery)),
             None => ("-".to_owned(), "-".to_owned()),
         };
-        println!(
+        say_line(format!(
             "{:<8} {:>8.1} {:>10} {:>14.1} {faery:>13} {ratio:>7}",
             row.format, row.megabytes, row.events, row.evtach_mev_s
-        );
+        ))?;
     }
     if rows.iter().all(|row| row.faery_mev_s.is_none()) {
-        println!("faery is not there: run tests/interop/setup.sh, then this again");
+        say_line("faery is not there: run tests/interop/setup.sh, then this again")?;
     }
     Ok(())
 }

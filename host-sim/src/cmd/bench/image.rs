@@ -9,6 +9,7 @@ use anyhow::Context as _;
 use evtach_host::device;
 
 use super::budget::{ASKED_FLASH_BYTES, ASKED_RAM_BYTES};
+use super::say_line;
 use crate::cmd::tell;
 
 /// Arguments of `evtach bench image`.
@@ -27,7 +28,7 @@ const RECORDING_BYTES: u64 = 7 << 20;
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     tell("building the firmware");
     let image = device::build_for_board()?;
-    println!("{}", image.path.display());
+    say_line(image.path.display())?;
     let ram_bytes = image.ram_bytes + image.stack_bytes;
     let mut fits = true;
     for (what, is, asked) in [
@@ -36,14 +37,17 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     ] {
         let verdict = if is <= asked { "" } else { "  TOO MUCH" };
         fits &= is <= asked;
-        println!("  {what:<24}{is:>10} of {asked}{verdict}");
+        say_line(format!("  {what:<24}{is:>10} of {asked}{verdict}"))?;
     }
-    println!("    variables             {:>10}", image.ram_bytes);
-    println!("    stack                 {:>10}", image.stack_bytes);
-    println!("  SDRAM, bytes            {:>10} frames, {RECORDING_BYTES} recordings", FRAMES_BYTES);
+    say_line(format!("    variables             {:>10}", image.ram_bytes))?;
+    say_line(format!("    stack                 {:>10}", image.stack_bytes))?;
+    say_line(format!(
+        "  SDRAM, bytes            {:>10} frames, {RECORDING_BYTES} recordings",
+        FRAMES_BYTES
+    ))?;
     if let Some(out) = &args.out {
         fs::write(out, &image.flash).with_context(|| format!("cannot write {}", out.display()))?;
-        println!("{}: copy it to the drive of the board", out.display());
+        say_line(format!("{}: copy it to the drive of the board", out.display()))?;
     }
     Ok(ExitCode::from(u8::from(!fits)))
 }

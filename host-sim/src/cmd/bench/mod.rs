@@ -9,6 +9,7 @@
 mod accuracy;
 mod blind;
 mod budget;
+mod cost;
 mod decode;
 mod drive;
 mod image;
@@ -19,11 +20,10 @@ mod spec;
 mod throughput;
 mod trust;
 
-mod cost;
-
+use std::fmt::Display;
 use std::process::ExitCode;
 
-use super::tell;
+use super::{say, tell};
 
 /// Arguments of `evtach bench`.
 #[derive(clap::Args)]
@@ -109,4 +109,9 @@ pub fn run(args: Args) -> anyhow::Result<ExitCode> {
         tell(short);
     }
     Ok(if report.short.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Prints a line of an answer as soon as it is known.
+fn say_line(line: impl Display) -> anyhow::Result<()> {
+    say(format!("{line}\n"))
 }

@@ -2,12 +2,12 @@
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
-use std::io::Write as _;
+use std::fmt::Write as _;
 
 use serde_json::{Map, Value, json};
 
-use super::Common;
 use super::spec::SCORED_FROM;
+use super::{Common, say};
 
 /// A table for people.
 #[derive(Debug)]
@@ -42,7 +42,7 @@ impl Report {
             // Nothing was run: a scene was shown.
             return Ok(());
         }
-        let mut out = std::io::stdout().lock();
+        let mut out = String::new();
         if common.json {
             writeln!(out, "{}", self.document(common))?;
         } else if common.csv {
@@ -55,7 +55,7 @@ impl Report {
                 writeln!(out, "Tuning seeds: these figures are not results.")?;
             }
         }
-        Ok(())
+        say(out)
     }
 
     fn document(&self, common: &Common) -> Value {
@@ -97,7 +97,7 @@ fn quoted(text: &str) -> String {
 }
 
 impl Table {
-    fn print(&self, out: &mut impl std::io::Write) -> std::io::Result<()> {
+    fn print(&self, out: &mut String) -> std::fmt::Result {
         let lengths = |row: &[String]| row.iter().map(|c| c.chars().count()).collect::<Vec<_>>();
         let mut widths = lengths(&self.columns);
         for row in &self.rows {

@@ -12,6 +12,8 @@ use evtach_core::{Geometry, Settings};
 use evtach_host::measure::{Capacity, drain, feed, with_tachometer};
 use evtach_host::synth::{Rotor, Scene, generate};
 
+use super::say_line;
+
 /// Arguments of `evtach bench throughput`.
 #[derive(clap::Args)]
 pub struct Args {
@@ -108,10 +110,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 
 fn print(rows: &[Row], json: bool) -> anyhow::Result<()> {
     if json {
-        println!("{}", serde_json::to_string(rows)?);
+        say_line(serde_json::to_string(rows)?)?;
         return Ok(());
     }
-    println!(
+    say_line(format!(
         "{:<26} {:<8} {:>10} {:>13} {:>15} {:>16} {:>9} {:>9}",
         "scene",
         "memory",
@@ -121,9 +123,9 @@ fn print(rows: &[Row], json: bool) -> anyhow::Result<()> {
         "times real time",
         "readings",
         "first ms"
-    );
+    ))?;
     for row in rows {
-        println!(
+        say_line(format!(
             "{:<26} {:<8} {:>10} {:>13.1} {:>15.1} {:>16.1} {:>9} {:>9.0}",
             row.scene,
             row.capacity,
@@ -133,7 +135,7 @@ fn print(rows: &[Row], json: bool) -> anyhow::Result<()> {
             row.times_real_time,
             row.readings,
             row.first_ms
-        );
+        ))?;
     }
     Ok(())
 }

@@ -22,11 +22,11 @@ use evtach_host::synth::{Model, Motion, Scene, generate};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::Common;
 use super::drive::{Capacity, readings};
 use super::report::{Report, progress};
 use super::score::{Score, Scores, is_wrong, score};
 use super::spec;
+use super::{Common, say_line};
 use crate::cmd::tell;
 
 /// Counts the changes of [`scenes`]: results of different scenes must not be mixed in one file.
@@ -124,7 +124,7 @@ struct Spoken {
 /// Runs the benchmark.
 pub fn run(args: &Args) -> anyhow::Result<Report> {
     if let Some(trial) = args.show {
-        println!("{}", serde_json::to_string_pretty(&scenes::scene(trial))?);
+        say_line(serde_json::to_string_pretty(&scenes::scene(trial))?)?;
         return Ok(Report { name: "trust", ..Report::default() });
     }
     let count = args.trials.unwrap_or(if args.common.quick { 40 } else { 3000 });
