@@ -200,11 +200,10 @@ impl<'p> Moving<'p> {
     #[inline]
     pub fn follow(&mut self, t_us: i32) -> (usize, f32, Knot) {
         let place = self.path.place(t_us as f32);
-        let mut f = place - self.stretch.index as f32;
-        if !(0.0..1.0).contains(&f) {
+        if place as usize != self.stretch.index {
             self.stretch = self.path.stretch(place);
-            f = place - self.stretch.index as f32;
         }
+        let f = place - self.stretch.index as f32;
         (self.stretch.index, f, self.stretch.at(f))
     }
 
