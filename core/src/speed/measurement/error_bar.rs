@@ -10,7 +10,7 @@ use crate::speed::statistics::root_sum_square;
 use crate::store::Window;
 use crate::tachometer::BASE_WINDOW_US;
 
-/// Own standard errors beyond which they contradict each other from a moving camera: one of the two went astray with the axis.
+/// Own standard errors beyond which a lock's two witnesses contradict each other from a moving camera: one of them went astray with the axis.
 const ASTRAY_SIGMAS: f32 = 4.0;
 /// A lock with a larger relative error is only coarse.
 pub(super) const MOST_LOCK_SIGMA: f32 = 3e-3;
