@@ -2,6 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
+use rand_pcg::Pcg64Mcg;
+
+use super::random::normal;
 use super::scene::{Rotor, Shape};
 
 /// Width of the blurred transition in units of the blur's standard deviation: that of a smoothstep.
@@ -14,6 +17,10 @@ pub struct Blades {
     blades: f64,
     pitch: f64,
     odd_width: f64,
+    /// Angle in radians by which each blade is off its even place.
+    places: Vec<f64>,
+    /// Whether each blade is like any other.
+    alike: bool,
     radius: f64,
     hub: f64,
     transition: f64,
@@ -57,15 +64,18 @@ fn rounded(x: f64) -> f64 {
 }
 
 impl Blades {
-    /// The outline of a rotor seen with a blur of `blur_px` (one standard deviation).
+    /// The outline of a rotor seen with a blur of `blur_px` (one standard deviation). Where its blades sit is drawn from `rng`.
     #[must_use]
-    pub fn new(rotor: &Rotor, blur_px: f64) -> Self {
+    pub fn new(rotor: &Rotor, blur_px: f64, rng: &mut Pcg64Mcg) -> Self {
         let blades = f64::from(rotor.blades);
+        let spread = rotor.blade_spread_mrad * 1e-3;
         Self {
             shape: rotor.shape,
             blades,
             pitch: TAU / blades,
             odd_width: rotor.odd_width,
+            places: (0..rotor.blades).map(|_| spread * normal(rng)).collect(),
+            alike: rotor.odd_width == 1.0 && spread == 0.0,
             radius: rotor.radius_px,
             hub: rotor.hub_radius_px(),
             transition: TRANSITION_PER_SIGMA * blur_px,
@@ -132,10 +142,15 @@ impl Blades {
         }
         let place = (angle - ring.bend) / self.pitch;
         let nearest = rounded(place);
-        let off = (place - nearest) * self.pitch;
-        let alike = self.odd_width == 1.0;
-        let width = if alike { 1.0 } else { self.width(nearest) };
-        let (mut cover, mut free) = self.blade(ring, half * width, width, off.abs());
+        let (width, at) = self.blade(nearest);
+        let off = (place - nearest) * self.pitch - at;
+        // The neighbour on that side: its width, and how far away its middle is.
+        let neighbour = || {
+            let side = off.signum();
+            let (width, beside) = self.blade(nearest + side);
+            (width, self.pitch - off.abs() + side * (beside - at))
+        };
+        let (mut cover, mut free) = self.seen(ring, half * width, width, off.abs());
         // The pixel moves against the rotor: `ahead` shrinks until the blade's middle passes.
         let ahead = off * sense;
         if sense != 0.0 && free > 0.0 && self.shape != Shape::Dot && off.abs() < half * width {
@@ -143,25 +158,22 @@ impl Blades {
             free = ahead + half * width - 0.5 * self.transition / ring.lever;
         } else if free > 0.0 && ahead <= 0.0 {
             // Leaving this blade, or not known: the next one counts.
-            let next = nearest - if sense == 0.0 { -off.signum() } else { sense };
-            let width = if alike { 1.0 } else { self.width(next) };
-            let (_, free_next) = self.blade(ring, half * width, width, self.pitch - off.abs());
+            let (width, away) = neighbour();
+            let (_, free_next) = self.seen(ring, half * width, width, away);
             free = if sense == 0.0 { free.min(free_next) } else { free_next };
         }
         let margin = 0.5 * self.transition / ring.lever;
         if self.pitch - off.abs() < half * width + margin {
             // So near the hub that the neighbour's blur is seen as well.
-            let next = nearest + off.signum();
-            let width = if alike { 1.0 } else { self.width(next) };
-            cover =
-                (cover + self.blade(ring, half * width, width, self.pitch - off.abs()).0).min(1.0);
+            let (width, away) = neighbour();
+            cover = (cover + self.seen(ring, half * width, width, away).0).min(1.0);
         }
         cover *= ring.tip;
         Look { cover: ring.hub + (1.0 - ring.hub) * cover, free }
     }
 
     /// Cover by one blade whose middle is `off` radians away, and how far it may turn unseen.
-    fn blade(&self, ring: &Ring, half: f64, width: f64, off: f64) -> (f64, f64) {
+    fn seen(&self, ring: &Ring, half: f64, width: f64, off: f64) -> (f64, f64) {
         if self.shape == Shape::Dot {
             let (m, d) = self.mark();
             let d = d * width;
@@ -174,15 +186,19 @@ impl Blades {
         (cover, (half - off).abs() - 0.5 / scale)
     }
 
-    /// Width of a blade relative to the others.
-    fn width(&self, number: f64) -> f64 {
-        if number.rem_euclid(self.blades) == 0.0 { self.odd_width } else { 1.0 }
+    /// Width of a blade relative to the others, and the angle in radians by which it is off its even place.
+    fn blade(&self, number: f64) -> (f64, f64) {
+        if self.alike {
+            return (1.0, 0.0);
+        }
+        let number = number.rem_euclid(self.blades) as usize;
+        (if number == 0 { self.odd_width } else { 1.0 }, self.places[number])
     }
 
     /// Angle of edge number `i` (even: leading) on a ring, or `None` where the blade does not reach.
     #[must_use]
     pub fn edge(&self, ring: &Ring, i: u32) -> Option<f64> {
-        let width = if i < 2 { self.odd_width } else { 1.0 };
+        let (width, off) = self.blade(f64::from(i / 2));
         let half = if self.shape == Shape::Dot {
             let (m, d) = self.mark();
             let d = d * width;
@@ -192,7 +208,7 @@ impl Blades {
             let seen = ring.r > self.hub && ring.r < self.radius;
             ring.half.filter(|_| seen)? * width
         };
-        let middle = f64::from(i / 2) * self.pitch + ring.bend;
+        let middle = f64::from(i / 2) * self.pitch + off + ring.bend;
         Some(if i.is_multiple_of(2) { middle + half } else { middle - half })
     }
 
@@ -210,5 +226,31 @@ impl Blades {
     #[must_use]
     pub fn edge_count(&self) -> u32 {
         self.blades as u32 * 2
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::{Purpose, stream};
+    use super::*;
+
+    #[test]
+    fn a_blade_covers_half_of_what_its_edge_is_on_wherever_it_sits() {
+        for shape in [Shape::Straight, Shape::Tapered, Shape::Swept, Shape::Dot] {
+            let rotor = Rotor { blades: 5, shape, odd_width: 0.7, ..Rotor::default() };
+            let loose = Rotor { blade_spread_mrad: 20.0, ..rotor.clone() };
+            let made = |rotor| Blades::new(rotor, 0.7, &mut stream(3, Purpose::Blades, 0));
+            let (even, loose) = (made(&rotor), made(&loose));
+            let ring = loose.ring(0.75 * rotor.radius_px);
+            let mut moved = 0;
+            for i in 0..loose.edge_count() {
+                let (at, was) = (loose.edge(&ring, i).unwrap_or(0.0), even.edge(&ring, i));
+                let look = loose.look(&ring, at, 1.0);
+                assert!((look.cover - 0.5).abs() < 0.01, "{shape:?} {i}: {look:?}");
+                assert!(look.free <= 0.0, "{shape:?} {i}: {look:?}");
+                moved += u32::from((at - was.unwrap_or(0.0)).abs() > 1e-3);
+            }
+            assert!(moved > 7, "{shape:?}: {moved}");
+        }
     }
 }

@@ -52,6 +52,8 @@ impl Rotor {
         check(&at("blades"), self.blades.into(), (1..=32).contains(&self.blades), "1 to 32")?;
         let odd = self.odd_width;
         check(&at("odd_width"), odd, odd > 0.0 && odd <= 1.2, "above 0, at most 1.2")?;
+        let spread = self.blade_spread_mrad;
+        check(&at("blade_spread_mrad"), spread, (0.0..=20.0).contains(&spread), "0 to 20")?;
         check(&at("tilt_deg"), self.tilt_deg, self.tilt_deg.abs() < 80.0, "below 80")?;
         check(&at("contrast"), self.contrast, self.contrast.abs() < 10.0, "within 10")?;
         // Beyond that the angles would be rounded.

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use super::backdrop::{Light, Shade, Texture};
 use super::blades::{Blades, Ring};
 use super::motion::{Motion, Pose, PoseTable, Spin};
+use super::random::{Purpose, stream};
 use super::scene::{Rotor, Scene};
 
 /// Largest step in pixels of an edge's motion between two samples.
@@ -35,7 +36,8 @@ pub struct Layer {
 
 impl Layer {
     fn new(rotor: &Rotor, number: usize, scene: &Scene, motion: &Motion, span: (f64, f64)) -> Self {
-        let blades = Blades::new(rotor, scene.sensor.blur_px);
+        let mut places = stream(scene.seed, Purpose::Blades, number as u64);
+        let blades = Blades::new(rotor, scene.sensor.blur_px, &mut places);
         let spin = motion.spins()[number].clone();
         let (sin, cos) = rotor.tilt_axis_deg.to_radians().sin_cos();
         // Where the centre gets to, in milliseconds steps; half a pixel covers what lies between.

@@ -73,6 +73,11 @@ impl<'a> Pixel<'a> {
         self.sensor.refractory_us * 1e-6
     }
 
+    /// Whether it knows nothing of what was before the recording.
+    pub fn starts_cold(&self) -> bool {
+        self.sensor.cold_start
+    }
+
     /// A number from `least` to `least + spread`, drawn evenly.
     pub fn drawn(&mut self, least: u32, spread: u32) -> u32 {
         least + self.rng.random_range(0..=spread)

@@ -21,6 +21,8 @@ pub enum Purpose {
     Gyro = 6,
     /// The clock's error.
     Clock = 7,
+    /// Where a rotor's blades sit.
+    Blades = 8,
 }
 
 /// The stream for a purpose and a place (a pixel's number, for one).

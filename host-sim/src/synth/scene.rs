@@ -66,6 +66,8 @@ pub struct Rotor {
     pub shape: Shape,
     /// Width of the first blade relative to the others, above 0 and up to 1.2; 1: all alike.
     pub odd_width: f64,
+    /// Standard deviation of the blades' angles about even places in milliradians, drawn from the seed, 0 to 20; 0: exactly even.
+    pub blade_spread_mrad: f64,
     /// Speed relative to the room at the start, in revolutions per minute; positive is clockwise on the screen.
     pub rpm: f64,
     /// Relative change of the speed per second: rpm(t) = rpm * (1 + ramp * t).
@@ -171,6 +173,9 @@ pub struct Sensor {
     pub readout_queue: u32,
     /// Every event is reported as ON, as some broken recordings do.
     pub all_on: bool,
+    /// The pixels know nothing of what was before the recording, as where a sensor or its simulator is only just started: each
+    /// takes what it sees at first for its level, and reports its first edge earlier than later ones. Threshold model only.
+    pub cold_start: bool,
 }
 
 /// The sensor's clock.
@@ -275,6 +280,7 @@ impl Default for Rotor {
             blades: 3,
             shape: Shape::default(),
             odd_width: 1.0,
+            blade_spread_mrad: 0.0,
             rpm: 3000.0,
             ramp_per_s: 0.0,
             hunting: 0.0,
@@ -310,6 +316,7 @@ impl Default for Sensor {
             readout_mev_s: None,
             readout_queue: 4096,
             all_on: false,
+            cold_start: false,
         }
     }
 }
@@ -340,10 +347,11 @@ impl Rotor {
     }
 
     /// Time until the picture repeats at the given speed, in seconds: a turn over the blades, or a whole turn when
-    /// one blade differs.
+    /// they differ.
     #[must_use]
     pub fn period_s(&self) -> f64 {
-        let blades = if self.odd_width == 1.0 { f64::from(self.blades) } else { 1.0 };
+        let alike = self.odd_width == 1.0 && self.blade_spread_mrad == 0.0;
+        let blades = if alike { f64::from(self.blades) } else { 1.0 };
         60.0 / (self.rpm.abs().max(1e-3) * blades)
     }
 }

@@ -159,6 +159,32 @@ fn the_first_turn_is_like_the_others() {
 }
 
 #[test]
+fn edges_come_early_where_a_sensor_has_only_just_started() {
+    let mut scene = fixed(Model::Threshold, 600.0);
+    scene.sensor.noise_hz = 0.0;
+    scene.sensor.cold_start = true;
+    let (slope, _) = phase_error(&scene, &generate(&scene).unwrap());
+    assert!(slope.abs() > 3e-5, "{slope}");
+}
+
+#[test]
+fn blades_that_sit_loosely_turn_evenly_all_the_same() {
+    for model in MODELS {
+        let mut scene = fixed(model, 600.0);
+        scene.sensor.noise_hz = 0.0;
+        let even = generate(&scene).unwrap();
+        scene.rotors[0].blade_spread_mrad = 8.0;
+        let loose = generate(&scene).unwrap();
+        assert_ne!(even.events, loose.events, "{model:?}");
+        let (error, coherence) = phase_error(&scene, &loose);
+        assert!(error.abs() < 3e-5, "{model:?}: {error}");
+        assert!(coherence > 0.3, "{model:?}: {coherence}");
+        let (more, fewer) = (even.events.len() as f64, loose.events.len() as f64);
+        assert!((fewer / more - 1.0).abs() < 0.01, "{model:?}: {fewer} of {more}");
+    }
+}
+
+#[test]
 fn a_slow_readout_loses_and_counts() {
     let mut scene = fixed(Model::Edge, 3000.0);
     let all = generate(&scene).unwrap();

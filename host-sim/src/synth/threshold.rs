@@ -1,8 +1,8 @@
 //! First event model: a pixel fires when its logarithm of intensity has moved by its threshold since its last event.
 //!
 //! Time advances in steps that end where the next edge can be at the earliest, so that a pixel between two blades costs
-//! nothing. Simulation starts before the recording: a pixel that has never fired holds an arbitrary level, and its first
-//! visit by a blade would be timed differently from all later ones.
+//! nothing. Simulation starts before the recording, unless the scene says otherwise: a pixel that has never fired holds an arbitrary
+//! level, and its first visit by a blade is timed differently from all later ones.
 
 use evtach_core::Polarity;
 
@@ -28,6 +28,10 @@ impl Run {
     /// Brings a pixel to where the recording begins.
     #[must_use]
     pub fn new(field: &Field, mut view: View, pixel: &mut Pixel) -> Self {
+        if pixel.starts_cold() {
+            let walk = Walk::new(field, &mut view, 0.0, 0.0);
+            return Self { view, walk };
+        }
         let start_s = -TAIL_S - field.warm_up_s(&view);
         // What matters is how far the level is from the reference. With unequal thresholds that wanders from period to period
         // without ever settling; drawing the number of passes puts each pixel at another point of its round.

@@ -30,7 +30,7 @@ use super::{Common, say_line};
 use crate::cmd::tell;
 
 /// Counts the changes of [`scenes`]: results of different scenes must not be mixed in one file.
-const SCENES_VERSION: u32 = 2;
+const SCENES_VERSION: u32 = 3;
 
 /// Arguments of `evtach bench trust`.
 #[derive(clap::Args)]

@@ -39,6 +39,9 @@ pub struct RotorArgs {
     /// Width of the first blade relative to the others.
     #[arg(long)]
     odd_width: Option<f64>,
+    /// Standard deviation of the blades' angles about even places in milliradians.
+    #[arg(long)]
+    blade_spread: Option<f64>,
     /// Relative change of the speed per second.
     #[arg(long, allow_negative_numbers = true)]
     ramp: Option<f64>,
@@ -153,6 +156,9 @@ pub struct SensorArgs {
     /// Every event is reported as ON.
     #[arg(long)]
     all_on: bool,
+    /// The pixels take what they see at first for their level, as in a sensor that has only just started.
+    #[arg(long)]
+    cold_start: bool,
     /// Error of the clock in ppm [default: drawn from its stated ppm].
     #[arg(long, allow_negative_numbers = true)]
     clock_ppm: Option<f64>,
@@ -216,6 +222,7 @@ impl RotorArgs {
             set(&mut r.y_px, self.y);
             set(&mut r.shape, self.shape);
             set(&mut r.odd_width, self.odd_width);
+            set(&mut r.blade_spread_mrad, self.blade_spread);
             set(&mut r.ramp_per_s, self.ramp);
             set(&mut r.hunting, self.hunting);
             set(&mut r.hunting_hz, self.hunting_hz);
@@ -273,6 +280,7 @@ impl SensorArgs {
         set(&mut s.readout_mev_s, self.readout_mev_s.map(Some));
         set(&mut s.readout_queue, self.readout_queue);
         s.all_on |= self.all_on;
+        s.cold_start |= self.cold_start;
         set(&mut scene.clock.sigma_ppm, self.clock_sigma_ppm);
         set(&mut scene.clock.error_ppm, self.clock_ppm.map(Some));
     }

@@ -2,7 +2,7 @@
 //!
 //! A fifth without a rotor: shaken walls, bars and gratings, walkers, lamps, noise, and mixtures. The others: speeds from
 //! 60 to 60 000 rpm and 1 to 8 blades (at most 150 000 passages a minute), radii from 12 to 80 px, every shape, half from
-//! the hand or on a shaken table, a tenth each with a ramp, hunting, one odd blade, a lamp (faint everywhere, or a deep spot); a sixth with more than one
+//! the hand or on a shaken table, blades that sit up to half a degree (one standard deviation) off their even places, half with a sensor that has only just started, a tenth each with a ramp, hunting, one odd blade, a lamp (faint everywhere, or a deep spot); a sixth with more than one
 //! rotor; some cut by the frame, some tilted, some too short on purpose, a few with a saturated readout or lost polarity.
 
 use evtach_host::synth::presets::{hand, shaken, wall};
@@ -26,6 +26,11 @@ pub fn scene(trial: u64) -> Scene {
     } else {
         rotors(&mut scene, &mut rng);
     }
+    // Last, so that all else of a trial is as it was when blades sat exactly and every pixel knew its level.
+    for rotor in &mut scene.rotors {
+        rotor.blade_spread_mrad = rng.random_range(0.0..8.0);
+    }
+    scene.sensor.cold_start = rng.random();
     scene
 }
 
