@@ -330,7 +330,7 @@ impl Pose {
             return false;
         }
         if core::mem::take(&mut self.trending) {
-            self.slope = self.settled_trend(sums);
+            self.slope = self.settled_trend(sums, window);
         } else if !self.end_round(sums, walked) {
             self.segment = 0;
             return false;

@@ -70,6 +70,8 @@ impl Measurement {
         if roll > 0.0 && locks {
             self.widen_astray();
         }
+        let start_rad_s = self.pose.start_rad_s(window);
+        self.estimate.sigma_rad_s = root_sum_square(self.estimate.sigma_rad_s, start_rad_s);
         match self.status {
             Status::Coarse => self.widen_coarse(window, held_up / QUEUE_SIGMA, roll),
             Status::Locked if self.pose.in_period() < MARK_BLOCKS => self.widen_mark(SHAKE_PX),

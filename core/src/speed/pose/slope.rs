@@ -39,6 +39,9 @@ const END_SWING: f32 = 5.0;
 const AS_EXACT: f32 = 1.25;
 const UNSETTLED_SIGMAS: f32 = 2.0;
 const MOVING_SIGMAS: f32 = 3.0;
+/// How far off a pixel that has only just started reports its first edge, in pixels at the rim (one standard deviation): it takes what it
+/// sees for its level, where each later edge finds it up to a threshold away.
+const EARLY_PX: f32 = 0.3;
 
 /// The turn followed through the window.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -107,11 +110,25 @@ impl Pose {
         if window.is_first() && small { unsettled_us } else { 0.0 }
     }
 
+    /// What the first pass of the blades over pixels that have only just started may do to the speed, in rad/s (one standard deviation); 0
+    /// where the stream does not begin with the window, or that pass was not believed. One point of n that is off by so much changes
+    /// the slope of a straight line by 6 / (n (n + 1)) of that.
+    // Not inlined: flash is short.
+    #[inline(never)]
+    pub fn start_rad_s(&self, window: &Window<'_>) -> f32 {
+        if !window.is_first() || self.slope.is_some_and(|slope| slope.unsettled_us > 0.0) {
+            return 0.0;
+        }
+        let pass_s = 1e-6 * self.period_us / self.sectors as f32;
+        let passes = 1e-6 * self.window_us / pass_s;
+        6.0 * EARLY_PX / (self.disc.radius_px * passes * (passes + 1.0) * pass_s)
+    }
+
     /// The trend of the turn, where pixels may not have settled at first: what they tell meanwhile is believed where the rest bears it out
     /// and it tells more. [`Self::slope`] is the trend through all blocks.
     // Not inlined: flash is short.
     #[inline(never)]
-    pub(super) fn settled_trend(&self, sums: &Sums) -> Option<Slope> {
+    pub(super) fn settled_trend(&self, sums: &Sums, window: &Window<'_>) -> Option<Slope> {
         let settled = self.trend_after(self.unsettled_us, sums);
         let (Some(all), Some(settled)) = (self.slope, settled) else {
             return self.slope.or(settled);
@@ -120,7 +137,9 @@ impl Pose {
         let sigma_rad_s = settled.speed.sigma_rad_s;
         // A hand did something meanwhile.
         let moves = all.drift_px_s > MOVING_PX_S;
-        let as_exact = !moves && sigma_rad_s < AS_EXACT * all.speed.sigma_rad_s;
+        let start_rad_s = self.start_rad_s(window);
+        let most_rad_s = root_sum_square(AS_EXACT * all.speed.sigma_rad_s, start_rad_s);
+        let as_exact = !moves && sigma_rad_s < most_rad_s;
         let sigmas = if moves { MOVING_SIGMAS } else { UNSETTLED_SIGMAS };
         Some(if as_exact || off_rad_s > sigmas * sigma_rad_s { settled } else { all })
     }
@@ -238,6 +257,30 @@ impl Pose {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rotors::Disc;
+    use crate::store::{MOST_SEGMENTS, MOST_SPARE, Store, StoredEvent};
+
+    #[test]
+    fn pixels_that_have_only_just_started_make_few_passes_less_sure() {
+        let mut memory = [StoredEvent::default(); 16 * MOST_SEGMENTS];
+        let mut store = Store::new(&mut memory, MOST_SPARE, 25_000);
+        for _ in 0..7 {
+            store.close_segment();
+        }
+        let disc = Disc { radius_px: 60.0, ..Disc::default() };
+        let share = |omega_rad_s: f32, window: &Window<'_>| {
+            let pose = Pose::new(disc, omega_rad_s, 4, 4, window.duration_us);
+            pose.start_rad_s(window) / omega_rad_s
+        };
+        let window = store.window(6, u64::MAX);
+        // 2 turns, 8 passes: 5 mrad of a quarter of a turn at one of 8 points.
+        let omega_rad_s = 2.0 * TAU / 0.15;
+        let expected = 5e-3 / (0.25 * TAU) * 6.0 / 72.0;
+        assert!((share(omega_rad_s, &window) / expected - 1.0).abs() < 1e-3);
+        assert!(share(10.0 * omega_rad_s, &window) < 0.02 * expected, "many passes");
+        store.drop_oldest();
+        assert!(share(omega_rad_s, &store.window(6, u64::MAX)) <= 0.0, "they have started");
+    }
 
     /// Turns of 40 blocks, `gap` in the middle not in step: `jump_rad` over them, and a scatter of a share of a cycle of the harmonic
     /// 12 about a speed that changes.
