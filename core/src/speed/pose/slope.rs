@@ -41,7 +41,7 @@ const UNSETTLED_SIGMAS: f32 = 2.0;
 const MOVING_SIGMAS: f32 = 3.0;
 /// How far off a pixel that has only just started reports its first edge, in pixels at the rim (one standard deviation): it takes what it
 /// sees for its level, where each later edge finds it up to a threshold away.
-const EARLY_PX: f32 = 0.3;
+const EARLY_PX: f32 = 0.2;
 
 /// The turn followed through the window.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -273,9 +273,9 @@ mod tests {
             pose.start_rad_s(window) / omega_rad_s
         };
         let window = store.window(6, u64::MAX);
-        // 2 turns, 8 passes: 5 mrad of a quarter of a turn at one of 8 points.
+        // 2 turns, 8 passes: 3.3 mrad of a quarter of a turn at one of 8 points.
         let omega_rad_s = 2.0 * TAU / 0.15;
-        let expected = 5e-3 / (0.25 * TAU) * 6.0 / 72.0;
+        let expected = 0.2 / 60.0 / (0.25 * TAU) * 6.0 / 72.0;
         assert!((share(omega_rad_s, &window) / expected - 1.0).abs() < 1e-3);
         assert!(share(10.0 * omega_rad_s, &window) < 0.02 * expected, "many passes");
         store.drop_oldest();

@@ -2,8 +2,10 @@
 //!
 //! A fifth without a rotor: shaken walls, bars and gratings, walkers, lamps, noise, and mixtures. The others: speeds from
 //! 60 to 60 000 rpm and 1 to 8 blades (at most 150 000 passages a minute), radii from 12 to 80 px, every shape, half from
-//! the hand or on a shaken table, blades that sit up to half a degree (one standard deviation) off their even places, half with a sensor that has only just started, a tenth each with a ramp, hunting, one odd blade, a lamp (faint everywhere, or a deep spot); a sixth with more than one
-//! rotor; some cut by the frame, some tilted, some too short on purpose, a few with a saturated readout or lost polarity.
+//! the hand or on a shaken table, blades that sit up to half a degree (one standard deviation) off their even places, half before
+//! a sensor that has only just started, a tenth each with a ramp, hunting, one odd blade, a lamp (faint everywhere, or a deep
+//! spot); a sixth with more than one rotor; some cut by the frame, some tilted, some too short on purpose, a few with a saturated
+//! readout or lost polarity.
 
 use evtach_host::synth::presets::{hand, shaken, wall};
 use evtach_host::synth::scene::{Background, Lamp, Mover, Shape};
