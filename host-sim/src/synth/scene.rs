@@ -174,7 +174,7 @@ pub struct Sensor {
     /// Every event is reported as ON, as some broken recordings do.
     pub all_on: bool,
     /// The pixels know nothing of what was before the recording, as where a sensor or its simulator is only just started: each
-    /// takes what it sees at first for its level, and reports its first edge earlier than later ones. Threshold model only.
+    /// takes what it sees at first for its level, and times its first edge otherwise than later ones. Threshold model only.
     pub cold_start: bool,
 }
 

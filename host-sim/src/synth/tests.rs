@@ -159,11 +159,12 @@ fn the_first_turn_is_like_the_others() {
 }
 
 #[test]
-fn edges_come_early_where_a_sensor_has_only_just_started() {
+fn a_sensor_that_has_only_just_started_times_its_first_edges_otherwise() {
     let mut scene = fixed(Model::Threshold, 600.0);
     scene.sensor.noise_hz = 0.0;
     scene.sensor.cold_start = true;
     let (slope, _) = phase_error(&scene, &generate(&scene).unwrap());
+    // More than any that has been started before: `events_turn_exactly_as_the_truth_says`.
     assert!(slope.abs() > 3e-5, "{slope}");
 }
 
